@@ -62,7 +62,10 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface], paths: &Paths) -> 
                 .join("::")
                 .trim_start_matches(':')
         );
-        let ray_query = shaders.iter().zip(interfaces).find(|(other, _)| is_by_ray_queries(shader, other));
+        let ray_query = shaders
+            .iter()
+            .zip(interfaces)
+            .find(|(other, _)| is_by_ray_queries(shader, other));
         if let Some((other, by_ray_queries)) = ray_query {
             check_stands_in(interface, by_ray_queries).map_err(|message| format!("{}: {message}", other.name))?;
         }
@@ -181,7 +184,8 @@ fn is_by_ray_queries(shader: &Shader, other: &Shader) -> bool {
 fn check_stands_in(of: &Interface, by_ray_queries: &Interface) -> Result<(), String> {
     let constants = |interface: &Interface| -> Vec<_> {
         let all = interface.spec.iter();
-        all.map(|constant| (constant.id, constant.name.clone(), constant.kind)).collect()
+        all.map(|constant| (constant.id, constant.name.clone(), constant.kind))
+            .collect()
     };
     let sets = |interface: &Interface| -> Vec<_> {
         let all = interface.bindings.iter().filter(|binding| binding.set != INDEX_SET);
@@ -194,12 +198,17 @@ fn check_stands_in(of: &Interface, by_ray_queries: &Interface) -> Result<(), Str
         "workgroup"
     } else if sets(of) != sets(by_ray_queries) {
         "sets"
-    } else if !constants(by_ray_queries).iter().all(|constant| known.contains(constant)) {
+    } else if !constants(by_ray_queries)
+        .iter()
+        .all(|constant| known.contains(constant))
+    {
         "specialization constants"
     } else {
         return Ok(());
     };
-    Err(format!("its {differs} are not those of the kernel that it stands in for"))
+    Err(format!(
+        "its {differs} are not those of the kernel that it stands in for"
+    ))
 }
 
 fn shader_module(

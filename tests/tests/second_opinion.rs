@@ -1,6 +1,6 @@
 //! spirv-reflect's opinion on the interfaces that the build reads with rspirv.
 //!
-//! spirv-reflect understands the storage classes of SPIR-V 1.0 only, so every shader without subgroup operations is compiled for Vulkan 1.0
+//! spirv-reflect understands the storage classes of SPIR-V 1.0 only, so every shader without subgroup operations and ray queries is compiled for Vulkan 1.0
 //! here, and both readers must agree on sets, bindings, descriptor types, and the offsets, counts, strides and widths of all that is in blocks
 //! and push constants. That the first reading is the one that the generated Rust code came from is shown by its fingerprint.
 
@@ -24,11 +24,14 @@ fn folder(below: &str) -> PathBuf {
 }
 
 /// The unoptimized module of a kernel for Vulkan 1.0. Where specialization constants set the size of the workgroup or of caches, all of them become plain
-/// constants, since spirv-reflect cannot read modules whose arrays have such sizes. `None` for kernels with subgroup operations, which came with
-/// Vulkan 1.1.
+/// constants, since spirv-reflect cannot read modules whose arrays have such sizes. `None` for kernels with subgroup operations or
+/// ray queries, which came later.
 fn compiled_for_1_0(file: &Path) -> Result<Option<Vec<u8>>, String> {
     let source = std::fs::read_to_string(file).map_err(|error| error.to_string())?;
-    if source.contains("GL_KHR_shader_subgroup") {
+    if ["GL_KHR_shader_subgroup", "GL_EXT_ray_query"]
+        .iter()
+        .any(|later| source.contains(later))
+    {
         return Ok(None);
     }
     let environment = "--target-env=vulkan1.0";
@@ -106,6 +109,7 @@ fn check(root: &Path, info: &ShaderInfo) -> Result<usize, String> {
             Resource::StorageImage { .. } => (vk::DescriptorType::STORAGE_IMAGE, [].as_slice()),
             Resource::SampledImage => (vk::DescriptorType::COMBINED_IMAGE_SAMPLER, [].as_slice()),
             Resource::TexelBuffer => (vk::DescriptorType::UNIFORM_TEXEL_BUFFER, [].as_slice()),
+            Resource::AccelerationStructure => (vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, [].as_slice()),
         };
         if *kind != expected {
             return Err(format!("{}: {expected:?} is {kind:?}", ours.name));

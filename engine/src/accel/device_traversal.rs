@@ -1,7 +1,7 @@
 //! What kernels must know of a ray index beside its texels.
 
-use crate::gpu::shaders::constants;
 use crate::gpu::interface::ComputeShader;
+use crate::gpu::shaders::constants;
 use crate::gpu::{Caps, ComputePipeline, DeviceKind, Gpu};
 use crate::{Error, Result};
 

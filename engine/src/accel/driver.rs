@@ -128,7 +128,11 @@ impl Frame {
         let size = (upper - lower).max(Vec3::ZERO).max_element();
         let reach = DRIVER_REACH * size;
         Self {
-            origin: if lower.cmple(upper).all() { 0.5 * (lower + upper) } else { Vec3::ZERO },
+            origin: if lower.cmple(upper).all() {
+                0.5 * (lower + upper)
+            } else {
+                Vec3::ZERO
+            },
             reach,
             growth: f64::from(BOX_SLACK) * f64::from(reach),
         }
@@ -136,7 +140,8 @@ impl Frame {
 
     /// A box in these coordinates, grown, and rounded outwards.
     fn grown(&self, bounds: &Aabb) -> StructureBox {
-        let at = |corner: Vec3, side: f64| corner.as_dvec3() - self.origin.as_dvec3() + DVec3::splat(side * self.growth);
+        let at =
+            |corner: Vec3, side: f64| corner.as_dvec3() - self.origin.as_dvec3() + DVec3::splat(side * self.growth);
         let lower = at(bounds.lower, -1.0).to_array().map(rounded_down);
         let upper = at(bounds.upper, 1.0).to_array().map(|x| -rounded_down(-x));
         [lower, upper]
@@ -146,7 +151,11 @@ impl Frame {
 /// The greatest f32 that is not above a number in its range.
 fn rounded_down(x: f64) -> f32 {
     let nearest = x as f32;
-    if f64::from(nearest) > x { nearest.next_down() } else { nearest }
+    if f64::from(nearest) > x {
+        nearest.next_down()
+    } else {
+        nearest
+    }
 }
 
 #[cfg(test)]
@@ -158,7 +167,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
     name: "ray index: the driver's acceleration structure, by ray queries",
     role: Role::Kernel,
     limits: "Only on devices with `VK_KHR_ray_query`, which the baseline driver lacks; a box for each triangle, so that hardware tests no triangles; rays from beyond 16 lengths of the scene try all triangles; never refitted; counts of work depend on the driver.",
-    sources: &[sources::KHRONOS_VULKAN.at("ray traversal"), sources::KHRONOS_RAY_QUERY.whole()],
+    sources: &[
+        sources::KHRONOS_VULKAN.at("ray traversal"),
+        sources::KHRONOS_RAY_QUERY.whole(),
+    ],
     shaders: &["shaders/accel/driver.glsl"],
     tests: &[
         "engine/src/accel/driver/tests.rs::boxes_hold_what_the_triangle_test_reports_of_rays_within_reach",

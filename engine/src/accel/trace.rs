@@ -20,7 +20,8 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
 use crate::gpu::{
-    AccelerationStructure, Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings, wide_counter,
+    AccelerationStructure, Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings,
+    wide_counter,
 };
 use crate::{Error, Result};
 

@@ -6,6 +6,7 @@ use crate::catalogue::Row;
 pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::box_test::ROWS,
     crate::accel::bvh2::ROWS,
+    crate::accel::driver::ROWS,
     crate::accel::kd::build::ROWS,
     crate::accel::kd::cache::ROWS,
     crate::accel::kd::probability::ROWS,
@@ -28,7 +29,6 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::triangle::oracles::ROWS,
     crate::accel::triangle::wald::ROWS,
     crate::accel::wide::ROWS,
-    crate::accel::driver::ROWS,
     crate::accel::yardstick::left_balanced::ROWS,
     crate::accel::yardstick::voxel_volume::ROWS,
     crate::film::accumulate::ROWS,

@@ -327,7 +327,8 @@ impl Caps {
                 .is_some_and(|family| family.queue_flags.contains(vk::QueueFlags::GRAPHICS)),
             ray_query,
             max_structure_boxes: structures.max_primitive_count,
-            structure_scratch_alignment: u64::from(structures.min_acceleration_structure_scratch_offset_alignment).max(1),
+            structure_scratch_alignment: u64::from(structures.min_acceleration_structure_scratch_offset_alignment)
+                .max(1),
             descriptor_indexing: vulkan12.runtime_descriptor_array != 0
                 && vulkan12.shader_sampled_image_array_non_uniform_indexing != 0,
             timestamp_period: if timestamp_valid_bits > 0 {

@@ -201,7 +201,8 @@ impl Gpu {
             error
         };
         let heap_bytes = options.lesser.heap_bytes;
-        let memory = Memory::new(&instance.raw, &device, physical_device, heap_bytes, caps.ray_query).map_err(give_up)?;
+        let memory =
+            Memory::new(&instance.raw, &device, physical_device, heap_bytes, caps.ray_query).map_err(give_up)?;
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: timelineSemaphore is enabled on every device that comes here.

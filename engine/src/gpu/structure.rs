@@ -69,7 +69,12 @@ impl Gpu {
     /// [`Error::MissingFeature`] on a device without [`Caps::ray_query`](super::Caps::ray_query); [`Error::LimitExceeded`] for more boxes than
     /// [`Caps::max_structure_boxes`](super::Caps::max_structure_boxes) and for what is larger than `maxMemoryAllocationSize`; [`Error::Setting`] for a box
     /// that is not finite or whose corners are not in order; [`Error::OutOfMemory`], [`Error::DeviceLost`].
-    pub fn box_structure(&self, name: &str, category: Category, boxes: &[StructureBox]) -> Result<AccelerationStructure> {
+    pub fn box_structure(
+        &self,
+        name: &str,
+        category: Category,
+        boxes: &[StructureBox],
+    ) -> Result<AccelerationStructure> {
         let Some(loader) = &self.inner.structures else {
             return Err(self.inner.lacks_ray_queries(name));
         };
