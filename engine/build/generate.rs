@@ -3,8 +3,8 @@
 //! One module a shader, nested as the folders are; structs that blocks are made of go to `types`, and descriptor sets that a GLSL
 //! include names (`// descriptor set 2: SceneSet`) go to `sets`, once, and must be the same in every shader that uses them.
 //!
-//! `x_driver.comp` is `x.comp` by ray queries, for pipelines that the host makes as those of `x`: it must have the same push constants, workgroup
-//! and sets but for that of the index, and no specialization constants that `x` lacks.
+//! The variant `driver` of a shader is the same kernel by ray queries, for pipelines that the host makes as those of the shader: it must have the same
+//! push constants, workgroup and sets but for that of the index, and no specialization constants that the shader lacks.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -48,12 +48,12 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface], paths: &Paths) -> 
             }
         }
         collect_types(interface, &mut types).map_err(|message| format!("{}: {message}", shader.name))?;
-        let (path, file) = shader.name.rsplit_once('/').unwrap_or(("", &shader.name));
+        let (path, file) = shader.file.rsplit_once('/').unwrap_or(("", &shader.file));
         let mut folder = &mut root;
         for part in path.split('/').filter(|part| !part.is_empty()) {
             folder = folder.folders.entry(part.to_owned()).or_default();
         }
-        let module = module_name(file);
+        let module = module_name(file, shader.variant);
         let _ = writeln!(
             all,
             "    &{}::INFO,",
@@ -101,14 +101,12 @@ fn write_folder(folder: &Folder, text: &mut String) {
     }
 }
 
-/// `trace_rays.comp` → `trace_rays`; graphics stages keep their stage as a suffix.
-fn module_name(file: &str) -> String {
+/// `trace_rays.comp` → `trace_rays`; graphics stages keep their stage as a suffix, and variants their name.
+fn module_name(file: &str, variant: Option<&str>) -> String {
     let (stem, stage) = file.rsplit_once('.').unwrap_or((file, ""));
-    if stage == "comp" {
-        stem.to_owned()
-    } else {
-        format!("{stem}_{stage}")
-    }
+    let suffix = Some(stage).filter(|stage| *stage != "comp");
+    let parts = [Some(stem), suffix, variant];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("_")
 }
 
 /// Sets that the shader's sources give a name to.
@@ -176,8 +174,7 @@ const INDEX_SET: u32 = 1;
 
 /// Whether `other` is the kernel `shader` by ray queries.
 fn is_by_ray_queries(shader: &Shader, other: &Shader) -> bool {
-    let stem = shader.name.strip_suffix(".comp");
-    stem.is_some_and(|stem| other.name.strip_suffix("_driver.comp") == Some(stem))
+    shader.variant.is_none() && other.variant == Some("driver") && shader.file == other.file
 }
 
 /// Fails for a module that cannot be given what the host gives another one.
@@ -221,6 +218,9 @@ fn shader_module(
     let mut text = String::new();
     for line in &shader.head {
         let _ = writeln!(text, "/// {line}");
+    }
+    if let Some(variant) = shader.variant {
+        let _ = writeln!(text, "///\n/// This is the variant `{variant}`.");
     }
     let _ = writeln!(text, "pub mod {module} {{\nuse {GPU}::interface::*;");
     let embedded = shader.embedded.display().to_string();

@@ -1,7 +1,7 @@
 // The ray index that a kernel traverses: closest_hit and any_hit by the kind that it is specialized to; the others compile to nothing.
 //
-// A module with ray queries is no module for devices without them. So kernels are compiled a second time for the driver's acceleration structures, from
-// entry files that end in `_driver` and define CLERESTORY_INDEX_DRIVER.
+// A module with ray queries is no module for devices without them. So an entry file with the line `// variant: driver` is compiled a second time, with
+// CLERESTORY_INDEX_DRIVER defined, for the driver's acceleration structure.
 //
 // A call goes on from `resume` (INDEX_START at first), improving `hit` (no_hit(ray.t_max) at first), and returns INDEX_FINISHED or where to
 // go on.

@@ -1,6 +1,47 @@
 #version 460
-// The extend stage of a wave, the closest hit of every walk's ray: walk/extend.glsl.
+// The extend stage of a wave: the closest hit of every walk's ray.
+//
+// A ray that its quota stops is counted and stalls the wave: the later stages leave at once, and the host runs this stage again, which
+// goes on where the ray was. So do rays that are left for later, since the submission's work is used up; they have not begun.
+// variant: driver
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
-#include "walk/extend.glsl"
+layout(local_size_x = 64) in;
+
+#include "walk/candidates.glsl"
+#include "walk/media.glsl"
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled == STALLED_SHADOW || place >= status.active_count) {
+        return;
+    }
+    uint resume = push.goes_on != 0u ? walk_resume[place] : INDEX_START;
+    if (resume == INDEX_FINISHED) {
+        return;
+    }
+    bool begun = has_work_left();
+    uint slot = load_slot(place);
+    WalkState walk = load_walk(slot);
+    begin_candidates(slot, walk.bounce, CANDIDATES_EXTEND);
+    Hit hit = no_hit(FAR_AWAY);
+    if (RESUMES && resume != INDEX_START) {
+        hit = walk_hits_out[place];
+    }
+    float t_min = 0.0;
+    if (HAS_MEDIA) {
+        // Behind the boundaries that the walk has passed.
+        t_min = status.rounds > 0u ? search_start(walk_medium_states[slot].start) : 0.0;
+    }
+    // One that is left for later has no direction, which ends its traversal at once.
+    vec3 direction = begun ? walk.direction : vec3(0.0);
+    uint next = closest_hit(Ray(walk.origin, t_min, direction, FAR_AWAY), RESUMES ? resume : INDEX_START, hit);
+    resume = begun ? next : resume;
+    walk_hits_out[place] = hit;
+    walk_resume[place] = resume;
+    count_work(index_iterations, WORK_LEAST);
+    if (resume != INDEX_FINISHED) {
+        stall_place(STALLED_EXTEND, begun);
+    }
+}

@@ -261,7 +261,8 @@ pub enum IndexBinding<'a> {
 }
 
 impl<'a> IndexBinding<'a> {
-    pub(super) fn new(texels: &'a TexelView, structure: Option<&'a AccelerationStructure>) -> Self {
+    /// Of texels, or, with a structure, of triangles as [`DriverIndex`] has both.
+    pub fn new(texels: &'a TexelView, structure: Option<&'a AccelerationStructure>) -> Self {
         match structure {
             None => Self::Own(IndexSet { index_texels: texels }),
             Some(driver_boxes) => Self::Driver(DriverSet {

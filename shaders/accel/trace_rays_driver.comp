@@ -1,8 +1,0 @@
-// trace_rays.comp for the driver's acceleration structures.
-#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_ray_query : require
-
-#define CLERESTORY_INDEX_DRIVER
-#include "accel/trace.glsl"
