@@ -5,7 +5,7 @@ pub use crate::gpu::{AccelerationStructure, BufferView, Image, Sampler, TexelVie
 /// A shader module with its reflected interface.
 #[derive(Debug)]
 pub struct ShaderInfo {
-    /// Path below `shaders/`.
+    /// Path below `shaders/`, and the variant, if it is one: `walk/extend.comp (driver)`.
     pub name: &'static str,
     /// Pipeline stage.
     pub stage: Stage,
