@@ -179,11 +179,11 @@ fn alpha_and_media_leave_pictures_by_the_drivers_structure_the_same() {
             println!("not supported: VK_KHR_ray_query");
             return;
         }
-        // From so far away that camera rays try all triangles, and stop.
-        let mut far = thin("builtin:cornell-box?sphere=glass");
+        // From 30 times the city's size, so that camera rays try all triangles, and stop.
+        let mut far = thin("builtin:box-city?n=60");
         let camera = &mut far.cameras[0];
         let back = camera.transform.matrix3.z_axis;
-        camera.transform.translation += 60.0 * back;
+        camera.transform.translation += 5000.0 * back;
         camera.projection = Projection::Perspective { fov_y: 0.03 };
         let scenes = [
             ("thin city", thin("builtin:box-city?n=60")),
