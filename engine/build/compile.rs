@@ -51,6 +51,13 @@ struct Entry {
     variant: Option<(&'static str, &'static str)>,
 }
 
+impl Entry {
+    /// The compiler's flag for the variant.
+    fn definition(&self) -> Option<String> {
+        self.variant.map(|(_, word)| format!("-D{word}"))
+    }
+}
+
 /// One compiled entry file.
 pub struct Shader {
     /// Path below the folder of shaders, with forward slashes, `accel/trace_rays.comp`, and the variant, if it is one: `accel/trace_rays.comp (driver)`.
@@ -115,7 +122,6 @@ impl Compiler {
         let file = below(root, &entry.file)?;
         let variant = entry.variant.map(|(variant, _)| variant);
         let name = variant.map_or(file.clone(), |variant| format!("{file} ({variant})"));
-        let defined: Vec<String> = entry.variant.iter().map(|(_, word)| format!("-D{word}")).collect();
         let places = self.sources(root, &entry.file, &file)?;
         let mut sources = BTreeMap::new();
         for (name, path) in &places {
@@ -126,15 +132,16 @@ impl Compiler {
             .filter(|line| !line.starts_with(VARIANT_MARK))
             .map(|line| line.trim_start_matches('/').trim().to_owned())
             .collect();
+        let definition = entry.definition().unwrap_or_default();
         let mut flags = EMBEDDED_FLAGS.as_slice();
         let mut folder = self.prebuilt.as_path();
-        let mut used = used_if_fresh(folder, &name, &fingerprint(&sources, flags, &defined));
+        let mut used = used_if_fresh(folder, &name, &fingerprint(&sources, flags, &definition));
         if used.is_none() {
             folder = out;
             if self.debug_info {
                 flags = &EMBEDDED_DEBUG_FLAGS;
             }
-            let print = fingerprint(&sources, flags, &defined);
+            let print = fingerprint(&sources, flags, &definition);
             used = used_if_fresh(folder, &name, &print);
             if used.is_none() {
                 let [embedded, reflected, stamp] = products(out, &name);
@@ -187,14 +194,9 @@ impl Compiler {
 
     fn glslc(&self, entry: &Entry, target: &Path, flags: &[&str], list: Option<&Path>) -> Result<(), String> {
         let mut command = Command::new(&self.program);
-        command.args(COMMON_FLAGS).args(flags);
-        command.args(entry.variant.map(|(_, word)| format!("-D{word}")));
-        command
-            .arg("-I")
-            .arg(&self.include)
-            .arg(&entry.file)
-            .arg("-o")
-            .arg(target);
+        command.args(COMMON_FLAGS).args(flags).args(entry.definition());
+        command.arg("-I").arg(&self.include);
+        command.arg(&entry.file).arg("-o").arg(target);
         if let Some(list) = list {
             command.arg("-MD").arg("-MF").arg(list);
         }
@@ -287,14 +289,13 @@ fn named_in(list: &str, places: &BTreeMap<String, PathBuf>) -> Vec<String> {
 }
 
 /// A hash of flags, paths and texts, the same on every machine.
-fn fingerprint(sources: &BTreeMap<String, String>, flags: &[&str], defined: &[String]) -> String {
+fn fingerprint(sources: &BTreeMap<String, String>, flags: &[&str], definition: &str) -> String {
     let flags = [&COMMON_FLAGS, REFLECTED_FLAGS.as_slice(), flags];
     let text: String = sources
         .iter()
         .flat_map(|(path, text)| [path.as_str(), "\0", text, "\0"])
         .collect();
-    let defined = defined.concat();
-    format!("{:016x}", fnv1a(format!("{flags:?}{defined}{text}").bytes()))
+    format!("{:016x}", fnv1a(format!("{flags:?}{definition}{text}").bytes()))
 }
 
 fn remove_others(out: &Path, shaders: &[Shader]) -> Result<(), String> {

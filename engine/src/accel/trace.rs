@@ -7,7 +7,8 @@
 //!
 //! Guarantees: all give the hits and, but for votes, the exact work of [`Traversal`](super::bvh2::Traversal), [`KdTraversal`](super::kd::KdTraversal) and [`WideTraversal`](super::wide::WideTraversal); no ray is lost and none is traced twice,
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
-//! differs from run to run, and shows in nothing but the time.
+//! differs from run to run, and shows in nothing but the time. In the driver's structure ([`driver`](super::driver)), one invocation per ray, hits are the
+//! same, and how many triangles are tried is the driver's.
 
 mod settings;
 
