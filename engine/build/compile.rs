@@ -28,6 +28,10 @@ const EMBEDDED_DEBUG_FLAGS: [&str; 2] = ["-O", "-g"];
 /// File extensions of entry files; everything else is included by them.
 const STAGES: [&str; 4] = ["comp", "vert", "frag", "geom"];
 
+/// Modules that an entry file can have beside its own, by a line `// variant: NAME` among its first: their names, and what is defined for them.
+const VARIANTS: [(&str, &str); 1] = [("driver", "CLERESTORY_INDEX_DRIVER")];
+const VARIANT_MARK: &str = "// variant: ";
+
 /// How to compile.
 pub struct Compiler {
     /// `glslc`, or where it is.
@@ -40,10 +44,28 @@ pub struct Compiler {
     pub prebuilt: PathBuf,
 }
 
+/// A module of an entry file.
+struct Entry {
+    file: PathBuf,
+    /// One of [`VARIANTS`].
+    variant: Option<(&'static str, &'static str)>,
+}
+
+impl Entry {
+    /// The compiler's flag for the variant.
+    fn definition(&self) -> Option<String> {
+        self.variant.map(|(_, word)| format!("-D{word}"))
+    }
+}
+
 /// One compiled entry file.
 pub struct Shader {
-    /// Path below the folder of shaders, with forward slashes: `accel/trace_rays.comp`.
+    /// Path below the folder of shaders, with forward slashes, `accel/trace_rays.comp`, and the variant, if it is one: `accel/trace_rays.comp (driver)`.
     pub name: String,
+    /// That path alone.
+    pub file: String,
+    /// The variant.
+    pub variant: Option<&'static str>,
     /// First comment block of the file, one string per line.
     pub head: Vec<String>,
     /// The module that goes into the library.
@@ -61,14 +83,26 @@ impl Compiler {
         let mut files = Vec::new();
         find(root, &mut files)?;
         files.sort();
+        let mut entries = Vec::new();
+        for file in files {
+            let variants = variants(&file)?;
+            entries.push(Entry {
+                file: file.clone(),
+                variant: None,
+            });
+            entries.extend(variants.into_iter().map(|variant| Entry {
+                file: file.clone(),
+                variant: Some(variant),
+            }));
+        }
         let next = AtomicUsize::new(0);
         let results = Mutex::new(Vec::new());
         let workers = std::thread::available_parallelism().map_or(1, usize::from);
         std::thread::scope(|scope| {
             for _ in 0..workers {
                 scope.spawn(|| {
-                    while let Some(file) = files.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let result = self.compile(root, file, out);
+                    while let Some(entry) = entries.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let result = self.compile(root, entry, out);
                         results.lock().expect("no worker panics").push(result);
                     }
                 });
@@ -84,35 +118,36 @@ impl Compiler {
         Ok(shaders)
     }
 
-    fn compile(&self, root: &Path, file: &Path, out: &Path) -> Result<Shader, String> {
-        let name = below(root, file)?;
-        let places = self.sources(root, file, &name)?;
+    fn compile(&self, root: &Path, entry: &Entry, out: &Path) -> Result<Shader, String> {
+        let file = below(root, &entry.file)?;
+        let variant = entry.variant.map(|(variant, _)| variant);
+        let name = variant.map_or(file.clone(), |variant| format!("{file} ({variant})"));
+        let places = self.sources(root, &entry.file, &file)?;
         let mut sources = BTreeMap::new();
         for (name, path) in &places {
             let text = std::fs::read_to_string(path).map_err(|error| failed(path, &error))?;
             sources.insert(name.clone(), text);
         }
-        let head = sources[&name]
-            .lines()
-            .skip_while(|line| line.starts_with("#version"))
-            .take_while(|line| line.starts_with("//"))
+        let head = head_of(&sources[&file])
+            .filter(|line| !line.starts_with(VARIANT_MARK))
             .map(|line| line.trim_start_matches('/').trim().to_owned())
             .collect();
+        let definition = entry.definition().unwrap_or_default();
         let mut flags = EMBEDDED_FLAGS.as_slice();
         let mut folder = self.prebuilt.as_path();
-        let mut used = used_if_fresh(folder, &name, &fingerprint(&sources, flags));
+        let mut used = used_if_fresh(folder, &name, &fingerprint(&sources, flags, &definition));
         if used.is_none() {
             folder = out;
             if self.debug_info {
                 flags = &EMBEDDED_DEBUG_FLAGS;
             }
-            let print = fingerprint(&sources, flags);
+            let print = fingerprint(&sources, flags, &definition);
             used = used_if_fresh(folder, &name, &print);
             if used.is_none() {
                 let [embedded, reflected, stamp] = products(out, &name);
                 let list = stamp.with_extension("d");
-                self.glslc(file, &reflected, &REFLECTED_FLAGS, Some(&list))?;
-                self.glslc(file, &embedded, flags, None)?;
+                self.glslc(entry, &reflected, &REFLECTED_FLAGS, Some(&list))?;
+                self.glslc(entry, &embedded, flags, None)?;
                 let list = std::fs::read_to_string(&list).map_err(|error| failed(&list, &error))?;
                 let names = named_in(&list, &places);
                 let text = std::iter::once(&print).chain(&names).map(|line| format!("{line}\n"));
@@ -124,6 +159,8 @@ impl Compiler {
         let [embedded, reflected, _] = products(folder, &name);
         Ok(Shader {
             name,
+            file,
+            variant,
             head,
             embedded,
             reflected,
@@ -155,10 +192,11 @@ impl Compiler {
         Ok(sources)
     }
 
-    fn glslc(&self, file: &Path, target: &Path, flags: &[&str], list: Option<&Path>) -> Result<(), String> {
+    fn glslc(&self, entry: &Entry, target: &Path, flags: &[&str], list: Option<&Path>) -> Result<(), String> {
         let mut command = Command::new(&self.program);
-        command.args(COMMON_FLAGS).args(flags);
-        command.arg("-I").arg(&self.include).arg(file).arg("-o").arg(target);
+        command.args(COMMON_FLAGS).args(flags).args(entry.definition());
+        command.arg("-I").arg(&self.include);
+        command.arg(&entry.file).arg("-o").arg(target);
         if let Some(list) = list {
             command.arg("-MD").arg("-MF").arg(list);
         }
@@ -177,6 +215,23 @@ impl Compiler {
             Err(String::from_utf8_lossy(&output.stderr).into_owned())
         }
     }
+}
+
+/// The comments that a file begins with.
+fn head_of(text: &str) -> impl Iterator<Item = &str> {
+    text.lines()
+        .skip_while(|line| line.starts_with("#version"))
+        .take_while(|line| line.starts_with("//"))
+}
+
+/// The variants that an entry file asks for.
+fn variants(file: &Path) -> Result<Vec<(&'static str, &'static str)>, String> {
+    let text = std::fs::read_to_string(file).map_err(|error| failed(file, &error))?;
+    let asked = head_of(&text).filter_map(|line| line.strip_prefix(VARIANT_MARK));
+    let known = |asked: &str| VARIANTS.into_iter().find(|(variant, _)| *variant == asked);
+    asked
+        .map(|asked| known(asked).ok_or_else(|| format!("{}: there is no variant {asked}", file.display())))
+        .collect()
 }
 
 fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), String> {
@@ -208,7 +263,7 @@ fn below(folder: &Path, path: &Path) -> Result<String, String> {
 
 /// The embedded module, the reflected module and the stamp of a shader.
 fn products(folder: &Path, name: &str) -> [PathBuf; 3] {
-    let flat = name.replace('/', "__");
+    let flat = name.replace('/', "__").replace(" (", ".").replace(')', "");
     ["spv", "reflect.spv", "stamp"].map(|end| folder.join(format!("{flat}.{end}")))
 }
 
@@ -234,13 +289,13 @@ fn named_in(list: &str, places: &BTreeMap<String, PathBuf>) -> Vec<String> {
 }
 
 /// A hash of flags, paths and texts, the same on every machine.
-fn fingerprint(sources: &BTreeMap<String, String>, flags: &[&str]) -> String {
+fn fingerprint(sources: &BTreeMap<String, String>, flags: &[&str], definition: &str) -> String {
     let flags = [&COMMON_FLAGS, REFLECTED_FLAGS.as_slice(), flags];
     let text: String = sources
         .iter()
         .flat_map(|(path, text)| [path.as_str(), "\0", text, "\0"])
         .collect();
-    format!("{:016x}", fnv1a(format!("{flags:?}{text}").bytes()))
+    format!("{:016x}", fnv1a(format!("{flags:?}{definition}{text}").bytes()))
 }
 
 fn remove_others(out: &Path, shaders: &[Shader]) -> Result<(), String> {

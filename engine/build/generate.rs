@@ -2,6 +2,9 @@
 //!
 //! One module a shader, nested as the folders are; structs that blocks are made of go to `types`, and descriptor sets that a GLSL
 //! include names (`// descriptor set 2: SceneSet`) go to `sets`, once, and must be the same in every shader that uses them.
+//!
+//! The variant `driver` of a shader is the same kernel by ray queries, for pipelines that the host makes as those of the shader: it must have the same
+//! push constants, workgroup and sets but for that of the index, and no specialization constants that the shader lacks.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -45,12 +48,12 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface], paths: &Paths) -> 
             }
         }
         collect_types(interface, &mut types).map_err(|message| format!("{}: {message}", shader.name))?;
-        let (path, file) = shader.name.rsplit_once('/').unwrap_or(("", &shader.name));
+        let (path, file) = shader.file.rsplit_once('/').unwrap_or(("", &shader.file));
         let mut folder = &mut root;
         for part in path.split('/').filter(|part| !part.is_empty()) {
             folder = folder.folders.entry(part.to_owned()).or_default();
         }
-        let module = module_name(file);
+        let module = module_name(file, shader.variant);
         let _ = writeln!(
             all,
             "    &{}::INFO,",
@@ -59,7 +62,14 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface], paths: &Paths) -> 
                 .join("::")
                 .trim_start_matches(':')
         );
-        folder.shaders += &shader_module(shader, interface, &module, &named);
+        let ray_query = shaders
+            .iter()
+            .zip(interfaces)
+            .find(|(other, _)| is_by_ray_queries(shader, other));
+        if let Some((other, by_ray_queries)) = ray_query {
+            check_stands_in(interface, by_ray_queries).map_err(|message| format!("{}: {message}", other.name))?;
+        }
+        folder.shaders += &shader_module(shader, interface, &module, &named, ray_query.is_some());
     }
     let mut text =
         String::from("/// Structs that shader blocks are made of, with the device's offsets.\npub mod types {\n");
@@ -91,14 +101,12 @@ fn write_folder(folder: &Folder, text: &mut String) {
     }
 }
 
-/// `trace_rays.comp` → `trace_rays`; graphics stages keep their stage as a suffix.
-fn module_name(file: &str) -> String {
+/// `trace_rays.comp` → `trace_rays`; graphics stages keep their stage as a suffix, and variants their name.
+fn module_name(file: &str, variant: Option<&str>) -> String {
     let (stem, stage) = file.rsplit_once('.').unwrap_or((file, ""));
-    if stage == "comp" {
-        stem.to_owned()
-    } else {
-        format!("{stem}_{stage}")
-    }
+    let suffix = Some(stage).filter(|stage| *stage != "comp");
+    let parts = [Some(stem), suffix, variant];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("_")
 }
 
 /// Sets that the shader's sources give a name to.
@@ -161,10 +169,58 @@ fn collect_type(kind: &Type, types: &mut Types) -> Result<(), String> {
     }
 }
 
-fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &BTreeMap<u32, String>) -> String {
+/// The set of the ray index, which ray queries have otherwise.
+const INDEX_SET: u32 = 1;
+
+/// Whether `other` is the kernel `shader` by ray queries.
+fn is_by_ray_queries(shader: &Shader, other: &Shader) -> bool {
+    shader.variant.is_none() && other.variant == Some("driver") && shader.file == other.file
+}
+
+/// Fails for a module that cannot be given what the host gives another one.
+fn check_stands_in(of: &Interface, by_ray_queries: &Interface) -> Result<(), String> {
+    let constants = |interface: &Interface| -> Vec<_> {
+        let all = interface.spec.iter();
+        all.map(|constant| (constant.id, constant.name.clone(), constant.kind))
+            .collect()
+    };
+    let sets = |interface: &Interface| -> Vec<_> {
+        let all = interface.bindings.iter().filter(|binding| binding.set != INDEX_SET);
+        all.cloned().collect()
+    };
+    let known = constants(of);
+    let differs = if of.push != by_ray_queries.push {
+        "push constants"
+    } else if of.local_size != by_ray_queries.local_size {
+        "workgroup"
+    } else if sets(of) != sets(by_ray_queries) {
+        "sets"
+    } else if !constants(by_ray_queries)
+        .iter()
+        .all(|constant| known.contains(constant))
+    {
+        "specialization constants"
+    } else {
+        return Ok(());
+    };
+    Err(format!(
+        "its {differs} are not those of the kernel that it stands in for"
+    ))
+}
+
+fn shader_module(
+    shader: &Shader,
+    interface: &Interface,
+    module: &str,
+    named: &BTreeMap<u32, String>,
+    has_ray_query: bool,
+) -> String {
     let mut text = String::new();
     for line in &shader.head {
         let _ = writeln!(text, "/// {line}");
+    }
+    if let Some(variant) = shader.variant {
+        let _ = writeln!(text, "///\n/// This is the variant `{variant}`.");
     }
     let _ = writeln!(text, "pub mod {module} {{\nuse {GPU}::interface::*;");
     let embedded = shader.embedded.display().to_string();
@@ -177,7 +233,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
         text,
         "/// What the module holds, by reflection.\npub static INFO: ShaderInfo = ShaderInfo {{\n    name: {:?},\n    stage: Stage::{},\n    \
          spirv: include_bytes!({embedded:?}),\n    push_constant_bytes: {push_bytes},\n    fingerprint: {},\n    local_size: [{}],\n    \
-         subgroups: {},\n    capabilities: &[{}],\n    bindings: &[",
+         subgroups: {},\n    capabilities: &[{}],\n    ray_query: {},\n    bindings: &[",
         shader.name,
         interface.stage,
         interface.fingerprint(),
@@ -189,6 +245,11 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
             .map(|name| format!("Capability::{name}"))
             .collect::<Vec<_>>()
             .join(", "),
+        if has_ray_query {
+            format!("Some(&super::{module}_driver::INFO)")
+        } else {
+            "None".into()
+        },
     );
     for binding in &interface.bindings {
         let kind = match &binding.resource {
@@ -197,6 +258,7 @@ fn shader_module(shader: &Shader, interface: &Interface, module: &str, named: &B
             Resource::StorageImage { .. } => "StorageImage",
             Resource::SampledImage => "SampledImage",
             Resource::TexelBuffer => "TexelBuffer",
+            Resource::AccelerationStructure => "AccelerationStructure",
         };
         let (reads, writes) = access(&binding.resource);
         let _ = writeln!(
@@ -362,6 +424,7 @@ fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {
             Resource::StorageImage { .. } => ("&'a Image", "storage image".into()),
             Resource::SampledImage => ("SampledView<'a>", "sampled image".into()),
             Resource::TexelBuffer => ("&'a TexelView", "texel buffer".into()),
+            Resource::AccelerationStructure => ("&'a AccelerationStructure", "acceleration structure".into()),
         };
         let mode = match access(&binding.resource) {
             (true, false) => "read",
@@ -385,6 +448,7 @@ fn rust_set(name: &str, set: u32, bindings: &[Binding]) -> String {
             Resource::StorageImage { .. } => "StorageImage",
             Resource::SampledImage => "Sampled",
             Resource::TexelBuffer => "Texels",
+            Resource::AccelerationStructure => "Structure",
         };
         let _ = writeln!(
             text,

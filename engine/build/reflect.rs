@@ -83,6 +83,8 @@ pub enum Resource {
     SampledImage,
     /// A buffer read texel by texel (`utextureBuffer`).
     TexelBuffer,
+    /// An acceleration structure (`accelerationStructureEXT`).
+    AccelerationStructure,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -117,7 +119,7 @@ pub struct Interface {
     pub local_size: [Result<u32, u32>; 3],
     /// It has subgroup operations.
     pub subgroups: bool,
-    /// What graphics stages need that not every device has, by its name in `gpu::interface::Capability`.
+    /// What it needs that not every device has, by its name in `gpu::interface::Capability`.
     pub capabilities: Vec<&'static str>,
 }
 
@@ -212,6 +214,7 @@ fn capabilities(module: &Module) -> Vec<&'static str> {
             Operand::Capability(Capability::ShaderViewportIndexLayerEXT | Capability::ShaderLayer) => {
                 Some("VertexLayer")
             }
+            Operand::Capability(Capability::RayQueryKHR) => Some("RayQuery"),
             _ => None,
         })
         .collect();
@@ -381,6 +384,7 @@ impl Reader {
                 writes: self.decoration(id, Decoration::NonWritable).is_none(),
             },
             (_, Op::TypeSampledImage) => Resource::SampledImage,
+            (_, Op::TypeAccelerationStructureKHR) => Resource::AccelerationStructure,
             (_, other) => return Err(format!("{name}: a binding of kind {other:?} is not supported")),
         };
         if name.is_empty() {

@@ -1,51 +1,14 @@
-// The buffer of a ray index, set 1, and what kernels hold of rays under way in it, whatever the index.
+// The buffer of a ray index, set 1, of those whose kernels are the engine's own.
 #ifndef CLERESTORY_ACCEL_INDEX_BINDINGS_GLSL
 #define CLERESTORY_ACCEL_INDEX_BINDINGS_GLSL
+
+#include "accel/index_rays.glsl"
 
 // descriptor set 1: IndexSet
 
 // What the texels hold stands in bvh2.glsl, kd.glsl and wide_layout.glsl. A texel buffer, since software drivers fetch texels for all lanes at once, but load
 // storage buffers lane by lane.
 layout(set = 1, binding = 0) uniform utextureBuffer index_texels;
-
-// Iterations after which a ray stops and waits for the next dispatch; INDEX_NEVER_STOPS for none.
-layout(constant_id = 100) const uint INDEX_QUOTA = 32768u;
-layout(constant_id = 101) const bool INDEX_COUNT = false;
-
-const uint INDEX_NEVER_STOPS = 0xFFFFFFFFu;
-
-// Where a ray begins, and what says that it has ended; anything else says where it goes on.
-const uint INDEX_START = 0u;
-const uint INDEX_FINISHED = 0xFFFFFFFFu;
-
-// Defined by the includer as a constant: false where every call begins at INDEX_START, which leaves the bookkeeping of resumption out.
-#ifndef INDEX_RESUMES
-#define INDEX_RESUMES true
-#endif
-
-// Exact work of an invocation, filled when INDEX_COUNT is set. Those from the leaves on are of kd-trees.
-struct IndexCounters {
-    uint nodes;
-    uint triangles;
-    uint iterations;
-    uint leaves;
-    uint pushes;
-    uint pops;
-    uint restarts;
-    uint cached_nodes;
-    uint register_pushes;
-    uint register_pops;
-};
-
-IndexCounters index_counters = IndexCounters(0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u);
-
-// Loop iterations of the invocation's traversals so far.
-uint index_iterations = 0u;
-
-#define INDEX_COUNT_ONE(counter) \
-    if (INDEX_COUNT) { \
-        ++index_counters.counter; \
-    }
 
 uvec4 index_texel(uint index) { return texelFetch(index_texels, int(index)); }
 

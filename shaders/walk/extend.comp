@@ -3,6 +3,7 @@
 //
 // A ray that its quota stops is counted and stalls the wave: the later stages leave at once, and the host runs this stage again, which
 // goes on where the ray was. So do rays that are left for later, since the submission's work is used up; they have not begun.
+// variant: driver
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

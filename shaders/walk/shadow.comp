@@ -3,6 +3,7 @@
 // media, as much of it as the media let through.
 //
 // Rays that are stopped or left for later stall the wave as in extend.comp.
+// variant: driver
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

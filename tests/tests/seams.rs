@@ -6,8 +6,8 @@
 
 use clerestory::accel::lbvh::{LbvhBuilder, LbvhSettings};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
-use clerestory::accel::{DeviceTraversal, IndexKind, Ray, RayIndex};
-use clerestory::gpu::{Gpu, TexelView};
+use clerestory::accel::{DeviceTraversal, IndexKind, IndexOnDevice, Ray, RayIndex};
+use clerestory::gpu::Gpu;
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
 use glam::Vec3;
@@ -175,8 +175,8 @@ fn meshes() -> Vec<Mesh> {
     ]
 }
 
-fn kinds() -> [IndexKind; 6] {
-    IndexKind::NAMES.map(|name| name.parse().unwrap())
+fn kinds() -> impl Iterator<Item = IndexKind> {
+    IndexKind::NAMES.iter().map(|name| name.parse().unwrap())
 }
 
 /// Rays that meet nothing, on all threads of the host.
@@ -190,8 +190,8 @@ fn lost_on_host(index: &dyn RayIndex, rays: &[Ray]) -> usize {
     })
 }
 
-/// The kernels of both models of execution: closest hits by one ray per thread, any hits by persistent threads.
-fn tracers(gpu: &Gpu, texels: &TexelView, traversal: DeviceTraversal) -> [RayTracer; 2] {
+/// The kernels of both models of execution: closest hits by one ray per thread, any hits by persistent threads, which the driver's structure has not.
+fn tracers(gpu: &Gpu, index: &IndexOnDevice) -> [RayTracer; 2] {
     let threads = PersistentThreads {
         groups: 256,
         batch: gpu.caps().subgroup_size,
@@ -204,12 +204,15 @@ fn tracers(gpu: &Gpu, texels: &TexelView, traversal: DeviceTraversal) -> [RayTra
     };
     let any = TraceSettings {
         query: Query::Any,
-        execution: Execution::Persistent(threads),
+        execution: match index.traversal {
+            DeviceTraversal::Driver => Execution::RayPerThread,
+            _ => Execution::Persistent(threads),
+        },
         ..closest
     };
     [closest, any].map(|settings| {
-        let settings = settings.fitted(gpu.caps(), traversal);
-        RayTracer::with_texels(gpu, texels.clone(), traversal, &settings).unwrap()
+        let settings = settings.fitted(gpu.caps(), index.traversal);
+        RayTracer::on_device(gpu, index, &settings).unwrap()
     })
 }
 
@@ -224,7 +227,10 @@ fn lost_on_device(tracer: &RayTracer, rays: &[Ray]) -> usize {
 fn check_host(count: usize, part: usize) {
     let mut random = Random(81);
     for mesh in meshes() {
-        let indexes = kinds().map(|kind| (kind, kind.build(&mesh.triangles).unwrap()));
+        let on_host = kinds().filter(|kind| *kind != IndexKind::Driver);
+        let indexes: Vec<_> = on_host
+            .map(|kind| (kind, kind.build(&mesh.triangles).unwrap()))
+            .collect();
         for (kind, index) in &indexes {
             let met = index.statistics().triangles as usize;
             assert_eq!(met, mesh.triangles.len(), "{}, {kind}: left out", mesh.what);
@@ -257,10 +263,10 @@ fn check_device(gpu: &Gpu, count: usize, part: usize) {
     let mut kept = Vec::new();
     for mesh in meshes() {
         let mut all = Vec::new();
-        for kind in kinds() {
+        for kind in kinds().filter(|kind| kind.is_offered_by(gpu.caps())) {
             let index = kind.build_for(gpu, &mesh.triangles).unwrap();
             assert_eq!(index.report.host_because, None, "{}, {kind}", mesh.what);
-            all.push((kind, tracers(gpu, &index.texels, index.traversal)));
+            all.push((kind, tracers(gpu, &index)));
         }
         for first in (0..count).step_by(part) {
             let rays = mesh.rays(&mesh.seams, part.min(count - first), &mut random);

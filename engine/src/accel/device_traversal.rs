@@ -1,7 +1,8 @@
 //! What kernels must know of a ray index beside its texels.
 
+use crate::gpu::interface::ComputeShader;
 use crate::gpu::shaders::constants;
-use crate::gpu::{Caps, DeviceKind};
+use crate::gpu::{Caps, ComputePipeline, DeviceKind, Gpu};
 use crate::{Error, Result};
 
 /// How kernels traverse an index.
@@ -16,6 +17,8 @@ pub enum DeviceTraversal {
     },
     /// Wide hierarchies.
     Wide,
+    /// The driver's acceleration structure, by ray queries.
+    Driver,
 }
 
 /// What the rounds of a kd-tree's kernel hold beside a way down, a leaf, and a way to what is left.
@@ -28,12 +31,24 @@ pub(crate) struct KdRounds {
 }
 
 impl DeviceTraversal {
-    /// What kernels are specialized by.
+    /// What kernels are specialized by; those for the driver's structure are for nothing else.
     pub fn kind(self) -> u32 {
         match self {
             Self::Bvh2 => constants::INDEX_BVH2,
             Self::Kd { .. } => constants::INDEX_KD,
             Self::Wide => constants::INDEX_WIDE,
+            Self::Driver => constants::INDEX_DRIVER,
+        }
+    }
+
+    /// The pipeline of a kernel that traverses it, of the module for ray queries where it is the driver's.
+    ///
+    /// # Errors
+    /// As [`Gpu::compute_pipeline`] and [`Gpu::ray_query_pipeline`].
+    pub fn pipeline<K: ComputeShader>(self, gpu: &Gpu, spec: &K::Spec) -> Result<ComputePipeline<K>> {
+        match self {
+            Self::Driver => gpu.ray_query_pipeline(spec),
+            _ => gpu.compute_pipeline(spec),
         }
     }
 
@@ -76,7 +91,8 @@ impl DeviceTraversal {
         }
         let lanes = caps.subgroup_size.max(1);
         let longest_leaf = match self {
-            Self::Bvh2 => return Ok(quota),
+            // One loop, with whatever filter; that of ray queries is the driver's own.
+            Self::Bvh2 | Self::Driver => return Ok(quota),
             Self::Wide => return wide_quota_within(quota, u64::from(iterations / lanes), filters),
             Self::Kd { longest_leaf } => longest_leaf,
         };

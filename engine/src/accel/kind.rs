@@ -9,12 +9,15 @@ use std::str::FromStr;
 use std::time::Instant;
 
 use super::bvh2::{Bvh2, Bvh2Settings};
+use super::driver::DriverIndex;
 use super::kd::{KdSettings, KdTree};
 use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
 use super::wide::{WideBvh, WideSettings};
 use super::{BuildStages, DeviceTraversal, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
-use crate::gpu::{Category, Gpu, TexelView};
+use crate::gpu::interface::{BindingSet, BoundResource};
+use crate::gpu::shaders::sets::{DriverSet, IndexSet};
+use crate::gpu::{AccelerationStructure, Caps, Category, Gpu, TexelView};
 use crate::{Error, Result};
 use glam::Vec3;
 
@@ -34,6 +37,8 @@ pub enum IndexKind {
     Kd(KdSettings),
     /// Eight children a node, compressed, made of the optimised linear hierarchy.
     Wide(WideSettings),
+    /// The driver's acceleration structure, on devices with ray queries.
+    Driver,
 }
 
 impl Default for IndexKind {
@@ -44,8 +49,8 @@ impl Default for IndexKind {
 
 impl IndexKind {
     /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
-    /// the device, the kd-tree, and the wide hierarchy.
-    pub const NAMES: [&'static str; 6] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide"];
+    /// the device, the kd-tree, the wide hierarchy, and the driver's acceleration structure.
+    pub const NAMES: [&'static str; 7] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide", "driver"];
 
     /// The linear hierarchy with default settings.
     pub fn lbvh(quality: BuildQuality) -> Self {
@@ -66,14 +71,20 @@ impl IndexKind {
             Self::LbvhOnDevice(_) => "lbvh-device",
             Self::Kd(_) => "kd",
             Self::Wide(_) => "wide",
+            Self::Driver => "driver",
         }
+    }
+
+    /// Whether a device has what it takes: ray queries, of the driver's structure.
+    pub fn is_offered_by(&self, caps: &Caps) -> bool {
+        caps.ray_query || *self != Self::Driver
     }
 
     /// Builds over `triangles` on the host's threads, also what the device would build: the tree is the same. Hits name triangles by their
     /// place in it. Deterministic whatever the number of threads.
     ///
     /// # Errors
-    /// As [`Bvh2::build`], [`lbvh::build`], [`KdTree::build`] and [`WideBvh::build`].
+    /// As [`Bvh2::build`], [`lbvh::build`], [`KdTree::build`] and [`WideBvh::build`]; [`Error::Setting`] for the driver's structure, which a device alone has.
     pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<Box<dyn RayIndex>> {
         Ok(match self {
             Self::Bvh2(settings) => Box::new(Bvh2::build(triangles, settings)?),
@@ -87,13 +98,17 @@ impl IndexKind {
             }
             Self::Kd(settings) => Box::new(KdTree::build(triangles, settings)?),
             Self::Wide(settings) => Box::new(WideBvh::build(triangles, settings)?),
+            Self::Driver => {
+                return Err(Error::setting("index", self, "is built by a device, and no host can"));
+            }
         })
     }
 
     /// Builds, where the kind says and the device can, and says how long that took.
     ///
     /// # Errors
-    /// As [`IndexKind::build`], and those of uploads and of submissions; [`Error::LimitExceeded`] for an index that the device cannot bind.
+    /// As [`IndexKind::build`], and those of uploads and of submissions; [`Error::LimitExceeded`] for an index that the device cannot bind;
+    /// [`Error::MissingFeature`] for the driver's structure on a device without ray queries.
     pub fn build_for(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<IndexOnDevice> {
         self.build_or_read_for(gpu, triangles, None)
     }
@@ -109,6 +124,20 @@ impl IndexKind {
         triangles: &[[Vec3; 3]],
         folder: Option<&Path>,
     ) -> Result<IndexOnDevice> {
+        if *self == Self::Driver {
+            let begin = Instant::now();
+            let built = DriverIndex::build(gpu, triangles)?;
+            let report = IndexReport {
+                build_ms: 1e3 * begin.elapsed().as_secs_f64(),
+                ..IndexReport::of(self.name(), BuildStages::default(), built.statistics)
+            };
+            return Ok(IndexOnDevice {
+                texels: built.triangles,
+                structure: Some(built.structure),
+                traversal: DeviceTraversal::Driver,
+                report,
+            });
+        }
         let mut fallback = None;
         if let Self::LbvhOnDevice(settings) = self {
             let builder = LbvhBuilder::new(gpu, settings)?;
@@ -116,16 +145,12 @@ impl IndexKind {
             match builder.build_resident(triangles) {
                 Ok(Some(built)) => {
                     let report = IndexReport {
-                        kind: self.name(),
                         build_ms: 1e3 * begin.elapsed().as_secs_f64(),
-                        stages: built.stages,
-                        host_because: None,
-                        instead_because: None,
-                        kept: None,
-                        statistics: built.statistics,
+                        ..IndexReport::of(self.name(), built.stages, built.statistics)
                     };
                     return Ok(IndexOnDevice {
                         texels: built.quarters,
+                        structure: None,
                         traversal: DeviceTraversal::Bvh2,
                         report,
                     });
@@ -143,6 +168,7 @@ impl IndexKind {
         let host_because = fallback;
         Ok(IndexOnDevice {
             texels: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
+            structure: None,
             traversal: index.device_traversal(),
             report: IndexReport { host_because, ..report },
         })
@@ -167,13 +193,9 @@ impl IndexKind {
             _ => (self.build(triangles)?, None),
         };
         let report = IndexReport {
-            kind: self.name(),
             build_ms: 1e3 * begin.elapsed().as_secs_f64(),
-            stages: index.stages(),
-            host_because: None,
-            instead_because: None,
             kept,
-            statistics: index.statistics(),
+            ..IndexReport::of(self.name(), index.stages(), index.statistics())
         };
         Ok((index, report))
     }
@@ -198,6 +220,7 @@ impl FromStr for IndexKind {
             Self::LbvhOnDevice(LbvhSettings::default()),
             Self::Kd(KdSettings::default()),
             Self::Wide(WideSettings::default()),
+            Self::Driver,
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
@@ -211,12 +234,59 @@ impl FromStr for IndexKind {
 /// A ray index in device memory.
 #[derive(Debug)]
 pub struct IndexOnDevice {
-    /// What kernels read, as [`RayIndex::texels`] has it.
+    /// What kernels read, as [`RayIndex::texels`] has it; with a structure, the triangles that [`DriverIndex`] has.
     pub texels: TexelView,
+    /// The driver's structure, of an index that is one.
+    pub structure: Option<AccelerationStructure>,
     /// How they traverse it.
     pub traversal: DeviceTraversal,
     /// How it was built.
     pub report: IndexReport,
+}
+
+impl IndexOnDevice {
+    /// Set 1 of the kernels that traverse it.
+    pub fn set(&self) -> IndexBinding<'_> {
+        IndexBinding::new(&self.texels, self.structure.as_ref())
+    }
+}
+
+/// Set 1 as the kernels of an index have it ([`DeviceTraversal::pipeline`]).
+#[derive(Debug, Clone, Copy)]
+pub enum IndexBinding<'a> {
+    /// Of the engine's own indexes.
+    Own(IndexSet<'a>),
+    /// Of the driver's structure.
+    Driver(DriverSet<'a>),
+}
+
+impl<'a> IndexBinding<'a> {
+    /// Of texels, or, with a structure, of triangles as [`DriverIndex`] has both.
+    pub fn new(texels: &'a TexelView, structure: Option<&'a AccelerationStructure>) -> Self {
+        match structure {
+            None => Self::Own(IndexSet { index_texels: texels }),
+            Some(driver_boxes) => Self::Driver(DriverSet {
+                driver_triangles: texels,
+                driver_boxes,
+            }),
+        }
+    }
+}
+
+impl<'a> BindingSet<'a> for IndexBinding<'a> {
+    fn set(&self) -> u32 {
+        match self {
+            Self::Own(set) => set.set(),
+            Self::Driver(set) => set.set(),
+        }
+    }
+
+    fn resources(&self) -> Vec<(u32, BoundResource<'a>)> {
+        match self {
+            Self::Own(set) => set.resources(),
+            Self::Driver(set) => set.resources(),
+        }
+    }
 }
 
 /// What became of an index that was to be kept on disk.
@@ -240,7 +310,7 @@ pub struct IndexReport {
     /// Wall-clock milliseconds of its build, or of reading what was kept, without the upload of what the host has built. Pipelines are made
     /// before it begins, but drivers that compile at the first dispatch, as Mesa's software driver does, do so within a device's first build.
     pub build_ms: f64,
-    /// Where these went.
+    /// Where these went; all zero of the driver's structure.
     pub stages: BuildStages,
     /// Why the host has built what the device was to build.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -254,6 +324,21 @@ pub struct IndexReport {
     /// Size and quality.
     #[serde(flatten)]
     pub statistics: IndexStatistics,
+}
+
+impl IndexReport {
+    /// Of a build whose time is not known yet.
+    fn of(kind: &'static str, stages: BuildStages, statistics: IndexStatistics) -> Self {
+        Self {
+            kind,
+            build_ms: 0.0,
+            stages,
+            host_because: None,
+            instead_because: None,
+            kept: None,
+            statistics,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -308,6 +393,8 @@ mod tests {
         );
         assert_eq!(serde_json::to_value(kept("kd")).unwrap()["kept"], "read");
         let wrong = IndexKind::Bvh2(Bvh2Settings { leaf_size: 0, bins: 16 });
-        assert!(matches!(wrong.build(&triangles), Err(Error::Setting { .. })));
+        for refused in [wrong, IndexKind::Driver] {
+            assert!(matches!(refused.build(&triangles), Err(Error::Setting { .. })));
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Floor 3: spatial indexes and their traversal. What a ray meets first, and whether it meets anything.
 //!
-//! Every index implements [`RayIndex`]: it is built on the CPU or holds what a device build read back, offers the texels that the
+//! Every index but the driver's implements [`RayIndex`]: it is built on the CPU or holds what a device build read back, offers the texels that the
 //! kernels bind as set 1, and carries the twin of its traversal. All indexes report the same hit for the same ray, bit for bit on one
 //! machine: the triangle test is shared ([`triangle`]), boxes are conservative for everything that test can report, and of candidates
 //! with equal distance the lowest triangle index wins.
@@ -19,13 +19,15 @@
 //! which returns `INDEX_FINISHED`, or where to go on when the quota `INDEX_QUOTA` has stopped the ray; `resume` is `INDEX_START` at first and
 //! `hit` is `no_hit(ray.t_max)`. With `CLERESTORY_CANDIDATE_FILTER` defined it asks `accept_candidate` before a hit counts, and where
 //! `INDEX_RESUMES` is false no call goes on with a ray. It has a number of its own in `accel/index.glsl`, by which kernels are specialized
-//! ([`DeviceTraversal::kind`]): every kernel that traverses any index traverses this one, too.
+//! ([`DeviceTraversal::kind`]): every kernel that traverses any index traverses this one, too. So do all but persistent threads by the driver's structure
+//! ([`driver`]), from modules of their own, since devices without ray queries must not see those.
 
 mod aabb;
 pub mod box_test;
 pub mod box_tree;
 pub mod bvh2;
 mod device_traversal;
+pub mod driver;
 mod input;
 pub mod kd;
 mod kind;
@@ -48,7 +50,7 @@ mod test_support;
 
 pub use aabb::Aabb;
 pub use device_traversal::DeviceTraversal;
-pub use kind::{IndexKept, IndexKind, IndexOnDevice, IndexReport};
+pub use kind::{IndexBinding, IndexKept, IndexKind, IndexOnDevice, IndexReport};
 pub use leaf_rule::LeafRule;
 pub use stages::BuildStages;
 

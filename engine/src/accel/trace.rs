@@ -7,21 +7,22 @@
 //!
 //! Guarantees: all give the hits and, but for votes, the exact work of [`Traversal`](super::bvh2::Traversal), [`KdTraversal`](super::kd::KdTraversal) and [`WideTraversal`](super::wide::WideTraversal); no ray is lost and none is traced twice,
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
-//! differs from run to run, and shows in nothing but the time.
+//! differs from run to run, and shows in nothing but the time. In the driver's structure ([`driver`](super::driver)), one invocation per ray, hits are the
+//! same, and how many triangles are tried is the driver's.
 
 mod settings;
 
 pub use settings::{Execution, PersistentThreads, Query, TraceSettings};
 
 use super::kd::KdCounters;
-use super::{DeviceTraversal, Hit, Ray, RayIndex, TraversalCounters};
+use super::{DeviceTraversal, Hit, IndexBinding, IndexOnDevice, Ray, RayIndex, TraversalCounters};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
-use crate::gpu::shaders::sets::IndexSet;
 use crate::gpu::{
-    Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings, wide_counter,
+    AccelerationStructure, Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings,
+    wide_counter,
 };
 use crate::{Error, Result};
 
@@ -121,7 +122,8 @@ macro_rules! dispatch_queue {
 pub struct RayTracer {
     gpu: Gpu,
     kernel: Kernel,
-    index: TexelView,
+    texels: TexelView,
+    structure: Option<AccelerationStructure>,
     traversal: DeviceTraversal,
     settings: TraceSettings,
 }
@@ -162,21 +164,47 @@ impl RayTracer {
         traversal: DeviceTraversal,
         settings: &TraceSettings,
     ) -> Result<Self> {
+        if traversal == DeviceTraversal::Driver {
+            let cause = "is no index of texels; RayTracer::on_device takes it";
+            return Err(Error::setting("index", "driver", cause));
+        }
+        Self::make(gpu, index, None, traversal, settings)
+    }
+
+    /// The same for an index of any kind that is on the device.
+    ///
+    /// # Errors
+    /// As [`RayTracer::new`]; [`Error::Setting`] for persistent threads in the driver's structure.
+    pub fn on_device(gpu: &Gpu, index: &IndexOnDevice, settings: &TraceSettings) -> Result<Self> {
+        let (texels, structure) = (index.texels.clone(), index.structure.clone());
+        Self::make(gpu, texels, structure, index.traversal, settings)
+    }
+
+    fn make(
+        gpu: &Gpu,
+        texels: TexelView,
+        structure: Option<AccelerationStructure>,
+        traversal: DeviceTraversal,
+        settings: &TraceSettings,
+    ) -> Result<Self> {
         settings.check(gpu.caps(), traversal)?;
         let (index_quota, index_count) = (settings.ray_quota, settings.count);
         let index_kind = traversal.kind();
         let trace_any = settings.query == Query::Any;
         let (kd_flags, kd_push_down, kd_short_stack) = settings.scheme.specialization();
         let kernel = match settings.execution {
-            Execution::RayPerThread => Kernel::RayPerThread(gpu.compute_pipeline(&trace_rays::Spec {
-                index_quota,
-                index_count,
-                index_kind,
-                trace_any,
-                kd_flags,
-                kd_push_down,
-                kd_short_stack,
-            })?),
+            Execution::RayPerThread => {
+                let spec = trace_rays::Spec {
+                    index_quota,
+                    index_count,
+                    index_kind,
+                    trace_any,
+                    kd_flags,
+                    kd_push_down,
+                    kd_short_stack,
+                };
+                Kernel::RayPerThread(traversal.pipeline(gpu, &spec)?)
+            }
             Execution::Persistent(threads) => {
                 let caps = gpu.caps();
                 let kernel = if settings.caches.vote {
@@ -192,7 +220,8 @@ impl RayTracer {
         Ok(Self {
             gpu: gpu.clone(),
             kernel,
-            index,
+            texels,
+            structure,
             traversal,
             settings: *settings,
         })
@@ -459,9 +488,7 @@ impl RayTracer {
         first: &mut u32,
         count: u32,
     ) -> Result<()> {
-        let index = IndexSet {
-            index_texels: &self.index,
-        };
+        let index = IndexBinding::new(&self.texels, self.structure.as_ref());
         match &self.kernel {
             Kernel::RayPerThread(kernel) => {
                 let most = u64::from(self.gpu.caps().max_workgroups[0]) * u64::from(kernel.group_size());

@@ -6,6 +6,7 @@ use crate::catalogue::Row;
 pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::box_test::ROWS,
     crate::accel::bvh2::ROWS,
+    crate::accel::driver::ROWS,
     crate::accel::kd::build::ROWS,
     crate::accel::kd::cache::ROWS,
     crate::accel::kd::probability::ROWS,

@@ -274,6 +274,18 @@ impl Pass<'_> {
                 // SAFETY: as above.
                 unsafe { inner.device.update_descriptor_sets(&[descriptor.image_info(&raw)], &[]) };
             }
+            (BindingKind::AccelerationStructure, BoundResource::Structure(structure)) => {
+                let name = slot.name;
+                self.recorder
+                    .check_device(&structure.inner.gpu, "acceleration structure", name)?;
+                self.recorder.keep(&structure.inner);
+                let raw = [structure.raw()];
+                let mut structures =
+                    vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(&raw);
+                let descriptor = descriptor.descriptor_count(1).push_next(&mut structures);
+                // SAFETY: as above.
+                unsafe { inner.device.update_descriptor_sets(&[descriptor], &[]) };
+            }
             _ => {
                 let message = format!("binding {} is not a {:?}", slot.name, slot.kind);
                 return Err(Error::Shader {

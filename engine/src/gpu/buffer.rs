@@ -188,11 +188,23 @@ impl Gpu {
             let cause = format!("is not what the buffer {:?} can be made for", desc.name);
             return Err(Error::setting("usage", format!("{:?}", desc.usage), cause));
         }
-        let bytes = desc.bytes.max(16).checked_next_multiple_of(4);
-        let bytes = bytes.ok_or_else(|| limit("maxMemoryAllocationSize", caps.max_allocation_size))?;
-        if desc.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER) && bytes > caps.max_storage_buffer_range {
+        let range = rounded(desc.bytes).filter(|bytes| *bytes > caps.max_storage_buffer_range);
+        if desc.usage.contains(vk::BufferUsageFlags::STORAGE_BUFFER) && range.is_some() {
             return Err(limit("maxStorageBufferRange", caps.max_storage_buffer_range));
         }
+        self.allocate_buffer(desc)
+    }
+
+    /// A buffer of any use that the device has enabled, which need not be bound.
+    pub(super) fn allocate_buffer(&self, desc: &BufferDesc<'_>) -> Result<Buffer> {
+        let caps = self.caps();
+        let limit = |limit_name, limit| Error::LimitExceeded {
+            name: desc.name.into(),
+            value: desc.bytes,
+            limit_name,
+            limit,
+        };
+        let bytes = rounded(desc.bytes).ok_or_else(|| limit("maxMemoryAllocationSize", caps.max_allocation_size))?;
         if bytes > caps.max_allocation_size {
             return Err(limit("maxMemoryAllocationSize", caps.max_allocation_size));
         }
@@ -246,6 +258,11 @@ impl Gpu {
         gpu.name(raw, desc.name);
         Ok(Buffer { inner: Arc::new(inner) })
     }
+}
+
+/// The size of a buffer of so many bytes; `None` where there is none.
+fn rounded(bytes: u64) -> Option<u64> {
+    bytes.max(16).checked_next_multiple_of(4)
 }
 
 impl Buffer {

@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use super::host::{DeviceFeatures, EnabledFeatures};
 use super::options::Lesser;
 
 /// Iterations of all loops of an invocation together after which software drivers end loops silently; the test that ends a loop counts
@@ -56,8 +57,12 @@ pub struct Caps {
     pub vertex_stores: bool,
     /// The queue takes draws as well as dispatches.
     pub graphics: bool,
-    /// `VK_KHR_ray_query` is enabled (of devices in a list: offered).
+    /// `VK_KHR_ray_query` is enabled (of devices in a list: offered), with `VK_KHR_acceleration_structure` and the addresses of buffers, which it needs.
     pub ray_query: bool,
+    /// `maxPrimitiveCount`, the boxes of an acceleration structure; 0 without `ray_query`.
+    pub max_structure_boxes: u64,
+    /// `minAccelerationStructureScratchOffsetAlignment`, bytes; 1 without `ray_query`.
+    pub structure_scratch_alignment: u64,
     /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing` are enabled (of devices in a list: offered).
     pub descriptor_indexing: bool,
     /// Nanoseconds a timestamp tick; 0 when the queue has no timestamps.
@@ -237,17 +242,22 @@ impl Caps {
             .push_next(&mut subgroup)
             .push_next(&mut sizes)
             .push_next(&mut maintenance);
-        let mut vulkan11 = vk::PhysicalDeviceVulkan11Features::default();
-        let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
-        let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-        let mut features = vk::PhysicalDeviceFeatures2::default()
-            .push_next(&mut vulkan11)
-            .push_next(&mut vulkan12)
-            .push_next(&mut vulkan13);
+        let offered = DeviceFeatures::offered(&instance.raw, device);
+        let DeviceFeatures {
+            vulkan10: features,
+            vulkan11,
+            vulkan12,
+            vulkan13,
+            ..
+        } = &offered;
+        let ray_query = EnabledFeatures::from_vulkan(&offered).optional.ray_query;
+        let mut structures = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+        if ray_query {
+            properties = properties.push_next(&mut structures);
+        }
         // SAFETY: the physical device belongs to the instance, and the chained structs live on this stack.
         let (memory, families, extensions) = unsafe {
             instance.raw.get_physical_device_properties2(device, &mut properties);
-            instance.raw.get_physical_device_features2(device, &mut features);
             (
                 instance.raw.get_physical_device_memory_properties(device),
                 instance.raw.get_physical_device_queue_family_properties(device),
@@ -257,7 +267,7 @@ impl Caps {
                     .unwrap_or_default(),
             )
         };
-        let (properties, features) = (properties.properties, features.features);
+        let properties = properties.properties;
         let limits = properties.limits;
         let operations = if subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE) {
             subgroup.supported_operations
@@ -315,7 +325,10 @@ impl Caps {
             graphics: families
                 .get(queue_family as usize)
                 .is_some_and(|family| family.queue_flags.contains(vk::QueueFlags::GRAPHICS)),
-            ray_query: has_extension(ash::khr::ray_query::NAME),
+            ray_query,
+            max_structure_boxes: structures.max_primitive_count,
+            structure_scratch_alignment: u64::from(structures.min_acceleration_structure_scratch_offset_alignment)
+                .max(1),
             descriptor_indexing: vulkan12.runtime_descriptor_array != 0
                 && vulkan12.shader_sampled_image_array_non_uniform_indexing != 0,
             timestamp_period: if timestamp_valid_bits > 0 {

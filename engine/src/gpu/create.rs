@@ -11,7 +11,7 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use super::caps::{Caps, DeviceKind};
 use super::device::{Gpu, Inner, Queue};
 use super::fault;
-use super::host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures};
+use super::host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures, RAY_QUERY_EXTENSIONS};
 use super::instance::{DeviceSummary, Instance, surface_extensions, vulkan};
 use super::memory::Memory;
 use super::options::{GpuOptions, Validation};
@@ -200,8 +200,9 @@ impl Gpu {
             }
             error
         };
+        let heap_bytes = options.lesser.heap_bytes;
         let memory =
-            Memory::new(&instance.raw, &device, physical_device, options.lesser.heap_bytes).map_err(give_up)?;
+            Memory::new(&instance.raw, &device, physical_device, heap_bytes, caps.ray_query).map_err(give_up)?;
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: timelineSemaphore is enabled on every device that comes here.
@@ -212,6 +213,9 @@ impl Gpu {
         let debug = instance
             .debug_utils
             .then(|| ext::debug_utils::Device::new(&instance.raw, &device));
+        let structures = caps
+            .ray_query
+            .then(|| khr::acceleration_structure::Device::new(&instance.raw, &device));
         let pipeline_cache = PipelineCache::open(&device, options.cache_folder.as_deref(), &caps.cache_key);
         let inner = Inner {
             device,
@@ -224,6 +228,7 @@ impl Gpu {
             caps,
             memory,
             debug,
+            structures,
             timeline,
             recycled: Mutex::default(),
             pipelines: Mutex::new(BTreeMap::new()),
@@ -272,7 +277,9 @@ fn create_device(
         .queue_family_index(queue_family)
         .queue_priorities(&priorities)];
     let mut features = enabled.to_vulkan();
-    features.vulkan12.buffer_device_address = (instance.validation == Validation::GpuAssisted).into();
+    if instance.validation == Validation::GpuAssisted {
+        features.vulkan12.buffer_device_address = vk::TRUE;
+    }
     let optional = &enabled.optional;
     let extensions: Vec<&CStr> = [
         (present, khr::swapchain::NAME),
@@ -282,6 +289,7 @@ fn create_device(
         ),
     ]
     .into_iter()
+    .chain(RAY_QUERY_EXTENSIONS.map(|name| (optional.ray_query, name)))
     .filter_map(|(wanted, name)| wanted.then_some(name))
     .collect();
     let extension_names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();

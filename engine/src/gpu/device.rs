@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use ash::vk::Handle;
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 
 use super::caps::Caps;
 use super::fault;
@@ -41,6 +41,8 @@ pub(super) struct Inner {
     pub caps: Caps,
     pub memory: Memory,
     pub debug: Option<ext::debug_utils::Device>,
+    /// Where ray queries are enabled.
+    pub structures: Option<khr::acceleration_structure::Device>,
     pub timeline: vk::Semaphore,
     pub recycled: Mutex<Vec<FrameResources>>,
     pub pipelines: Mutex<PipelineTable>,

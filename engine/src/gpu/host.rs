@@ -1,6 +1,8 @@
 //! A device that a host application made, and the features that it must have enabled.
 
-use ash::vk;
+use std::ffi::CStr;
+
+use ash::{khr, vk};
 
 use super::caps::Caps;
 use crate::{Error, Result};
@@ -45,6 +47,13 @@ pub struct EnabledFeatures {
     pub optional: OptionalFeatures,
 }
 
+/// The extensions of [`OptionalFeatures::ray_query`].
+pub const RAY_QUERY_EXTENSIONS: [&CStr; 3] = [
+    khr::acceleration_structure::NAME,
+    khr::deferred_host_operations::NAME,
+    khr::ray_query::NAME,
+];
+
 /// Features that the engine can do without, by their Vulkan names; one that a host did not enable counts as absent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct OptionalFeatures {
@@ -70,7 +79,7 @@ pub struct OptionalFeatures {
     pub vertex_pipeline_stores_and_atomics: bool,
     /// `VkPhysicalDeviceVulkan12Features::shaderBufferInt64Atomics`.
     pub shader_buffer_int64_atomics: bool,
-    /// `VK_KHR_ray_query` with its feature.
+    /// The [`RAY_QUERY_EXTENSIONS`] with `rayQuery`, `accelerationStructure` and `bufferDeviceAddress`.
     pub ray_query: bool,
     /// `runtimeDescriptorArray` and `shaderSampledImageArrayNonUniformIndexing`.
     pub descriptor_indexing: bool,
@@ -159,12 +168,15 @@ impl EnabledFeatures {
         caps.vertex_stores &= optional.vertex_pipeline_stores_and_atomics;
         caps.int64_atomics &= optional.shader_buffer_int64_atomics;
         caps.ray_query &= optional.ray_query;
+        if !caps.ray_query {
+            caps.max_structure_boxes = 0;
+        }
         caps.descriptor_indexing &= optional.descriptor_indexing;
         caps.full_subgroups &= optional.compute_full_subgroups;
     }
 
     /// The Vulkan structs that switch these features on, for a host that creates a device. `ray_query` and
-    /// `shader_viewport_index_layer` are extensions and have to be asked for beside them.
+    /// `shader_viewport_index_layer` are of extensions, which have to be asked for beside them.
     pub fn to_vulkan(&self) -> DeviceFeatures {
         let optional = &self.optional;
         DeviceFeatures {
@@ -179,6 +191,7 @@ impl EnabledFeatures {
                 .vertex_pipeline_stores_and_atomics(optional.vertex_pipeline_stores_and_atomics),
             vulkan11: vk::PhysicalDeviceVulkan11Features::default().multiview(optional.multiview),
             vulkan12: vk::PhysicalDeviceVulkan12Features::default()
+                .buffer_device_address(optional.ray_query)
                 .shader_output_layer(optional.shader_viewport_index_layer)
                 .shader_output_viewport_index(optional.shader_viewport_index_layer)
                 .timeline_semaphore(self.timeline_semaphore)
@@ -191,17 +204,22 @@ impl EnabledFeatures {
                 .synchronization2(self.synchronization2)
                 .dynamic_rendering(self.dynamic_rendering)
                 .compute_full_subgroups(optional.compute_full_subgroups),
+            acceleration_structure: vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default()
+                .acceleration_structure(optional.ray_query),
+            ray_query: vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(optional.ray_query),
         }
     }
 
     /// What the Vulkan structs switch on (or offer): the inverse of [`EnabledFeatures::to_vulkan`], for a host that filled them itself.
-    /// Extensions are not in the structs and count as off.
+    /// `shader_viewport_index_layer` is an extension alone and counts as off.
     pub fn from_vulkan(features: &DeviceFeatures) -> Self {
         let DeviceFeatures {
             vulkan10,
             vulkan11,
             vulkan12,
             vulkan13,
+            acceleration_structure,
+            ray_query,
         } = features;
         let on = |flag: vk::Bool32| flag != vk::FALSE;
         Self {
@@ -222,7 +240,9 @@ impl EnabledFeatures {
                 fragment_stores_and_atomics: on(vulkan10.fragment_stores_and_atomics),
                 vertex_pipeline_stores_and_atomics: on(vulkan10.vertex_pipeline_stores_and_atomics),
                 shader_buffer_int64_atomics: on(vulkan12.shader_buffer_int64_atomics),
-                ray_query: false,
+                ray_query: on(ray_query.ray_query)
+                    && on(acceleration_structure.acceleration_structure)
+                    && on(vulkan12.buffer_device_address),
                 descriptor_indexing: on(vulkan12.runtime_descriptor_array)
                     && on(vulkan12.shader_sampled_image_array_non_uniform_indexing),
                 compute_full_subgroups: on(vulkan13.compute_full_subgroups),
@@ -268,15 +288,26 @@ pub struct DeviceFeatures {
     pub vulkan12: vk::PhysicalDeviceVulkan12Features<'static>,
     /// Features of Vulkan 1.3.
     pub vulkan13: vk::PhysicalDeviceVulkan13Features<'static>,
+    /// Features of `VK_KHR_acceleration_structure`.
+    pub acceleration_structure: vk::PhysicalDeviceAccelerationStructureFeaturesKHR<'static>,
+    /// Features of `VK_KHR_ray_query`.
+    pub ray_query: vk::PhysicalDeviceRayQueryFeaturesKHR<'static>,
 }
 
 impl DeviceFeatures {
     /// Hangs the structs into a device's creation. The host may set more of their members before.
     pub fn chain<'a>(&'a mut self, info: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
-        info.enabled_features(&self.vulkan10)
+        let info = info
+            .enabled_features(&self.vulkan10)
             .push_next(&mut self.vulkan11)
             .push_next(&mut self.vulkan12)
-            .push_next(&mut self.vulkan13)
+            .push_next(&mut self.vulkan13);
+        // Devices without the extensions do not know their structs.
+        if self.ray_query.ray_query == vk::FALSE {
+            return info;
+        }
+        info.push_next(&mut self.acceleration_structure)
+            .push_next(&mut self.ray_query)
     }
 
     /// What a physical device of this instance offers.
@@ -286,6 +317,11 @@ impl DeviceFeatures {
             .push_next(&mut offered.vulkan11)
             .push_next(&mut offered.vulkan12)
             .push_next(&mut offered.vulkan13);
+        if has_ray_query_extensions(instance, device) {
+            features = features
+                .push_next(&mut offered.acceleration_structure)
+                .push_next(&mut offered.ray_query);
+        }
         // SAFETY: the device belongs to the instance; the chain lives on this stack.
         unsafe { instance.get_physical_device_features2(device, &mut features) };
         offered.vulkan10 = features.features;
@@ -293,8 +329,18 @@ impl DeviceFeatures {
         offered.vulkan11.p_next = std::ptr::null_mut();
         offered.vulkan12.p_next = std::ptr::null_mut();
         offered.vulkan13.p_next = std::ptr::null_mut();
+        offered.acceleration_structure.p_next = std::ptr::null_mut();
+        offered.ray_query.p_next = std::ptr::null_mut();
         offered
     }
+}
+
+/// Whether a physical device of the instance has all of [`RAY_QUERY_EXTENSIONS`].
+fn has_ray_query_extensions(instance: &ash::Instance, device: vk::PhysicalDevice) -> bool {
+    // SAFETY: the device belongs to the instance.
+    let extensions = unsafe { instance.enumerate_device_extension_properties(device) }.unwrap_or_default();
+    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+    RAY_QUERY_EXTENSIONS.into_iter().all(has)
 }
 
 #[cfg(test)]
@@ -306,6 +352,7 @@ mod tests {
         let bit = |set: bool| EnabledFeatures {
             optional: OptionalFeatures {
                 shader_int64: set,
+                ray_query: set,
                 descriptor_indexing: set,
                 compute_full_subgroups: set,
                 ..OptionalFeatures::NONE

@@ -1,11 +1,11 @@
 //! What the build generates for each shader is written in these terms.
 
-pub use crate::gpu::{BufferView, Image, Sampler, TexelView};
+pub use crate::gpu::{AccelerationStructure, BufferView, Image, Sampler, TexelView};
 
 /// A shader module with its reflected interface.
 #[derive(Debug)]
 pub struct ShaderInfo {
-    /// Path below `shaders/`.
+    /// Path below `shaders/`, and the variant, if it is one: `walk/extend.comp (driver)`.
     pub name: &'static str,
     /// Pipeline stage.
     pub stage: Stage,
@@ -20,8 +20,11 @@ pub struct ShaderInfo {
     /// It has subgroup operations. Such a compute shader runs in full subgroups where [`Caps::full_subgroups`](crate::gpu::Caps) says so
     /// and its workgroup along x is a multiple of a subgroup.
     pub subgroups: bool,
-    /// What graphics shaders need that not every device has.
+    /// What it needs that not every device has.
     pub capabilities: &'static [Capability],
+    /// The same kernel by ray queries, for [`Gpu::ray_query_pipeline`](crate::gpu::Gpu::ray_query_pipeline): of the same push constants, workgroup and sets
+    /// but for set 1, and of no other specialization constants.
+    pub ray_query: Option<&'static ShaderInfo>,
     /// Bindings by set and number, those included that the shader declares and does not use.
     pub bindings: &'static [BindingInfo],
     /// Specialization constants by id.
@@ -41,7 +44,7 @@ pub enum Stage {
     Fragment,
 }
 
-/// What a graphics shader may need of a device.
+/// What a shader may need of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Capability {
     /// It is a geometry shader, or reads what only such a stage writes.
@@ -52,6 +55,8 @@ pub enum Capability {
     MultiView,
     /// `gl_Layer` written by a vertex shader.
     VertexLayer,
+    /// Ray queries, in whatever shader.
+    RayQuery,
 }
 
 /// One axis of a workgroup's size.
@@ -118,6 +123,8 @@ pub enum BindingKind {
     SampledImage,
     /// Uniform texel buffer.
     TexelBuffer,
+    /// Acceleration structure.
+    AccelerationStructure,
 }
 
 /// One specialization constant.
@@ -164,7 +171,7 @@ impl SpecConstants for () {
 /// - [`ComputeShader::info`] is always the same one. Its module is valid SPIR-V for Vulkan 1.1 and of that stage, and all else that the info says is
 ///   so: bindings with what is read, written and used, the size of the push constants' block, the constants, the workgroup, subgroup operations and
 ///   capabilities.
-/// - The module asks for no other capabilities than those of Vulkan 1.0 and of what every [`Gpu`](crate::gpu::Gpu) enables.
+/// - The module asks for no other capabilities than those of Vulkan 1.0, of what every [`Gpu`](crate::gpu::Gpu) enables, and of what its info says.
 /// - Given what its documentation allows in push constants, specialization constants, buffers and images, no invocation leaves its own arrays or
 ///   those of its workgroup. Those of buffers the device keeps it in where [`Caps::robust_buffer_access`](crate::gpu::Caps) says so.
 pub unsafe trait ComputeShader {
@@ -247,6 +254,8 @@ pub enum BoundResource<'a> {
     Sampled(SampledView<'a>),
     /// Texel buffer.
     Texels(&'a TexelView),
+    /// Acceleration structure.
+    Structure(&'a AccelerationStructure),
 }
 
 /// An image with the sampler to read it by.

@@ -288,6 +288,7 @@ pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
         BindingKind::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
         BindingKind::SampledImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
         BindingKind::TexelBuffer => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        BindingKind::AccelerationStructure => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
     }
 }
 
@@ -361,6 +362,7 @@ mod tests {
             local_size: [LocalSize::Fixed(1); 3],
             subgroups: false,
             capabilities: &[],
+            ray_query: None,
             bindings,
             spec_constants: &[],
         }

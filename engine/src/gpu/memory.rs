@@ -144,19 +144,20 @@ impl State {
 }
 
 impl Memory {
-    /// `at_most` makes the heaps look smaller than they are.
+    /// `at_most` makes the heaps look smaller than they are; with `addresses` buffers may have device addresses.
     pub fn new(
         instance: &ash::Instance,
         device: &ash::Device,
         physical_device: vk::PhysicalDevice,
         at_most: Option<u64>,
+        addresses: bool,
     ) -> Result<Self> {
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
             physical_device,
             debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
-            buffer_device_address: false,
+            buffer_device_address: addresses,
             allocation_sizes: gpu_allocator::AllocationSizes::default(),
         })
         .map_err(|error| out_of_memory("allocator", 0, &error))?;

@@ -18,9 +18,10 @@
 //! | [`Gpu::buffer`], [`Gpu::buffer_with`], [`Gpu::storage_texels`], [`Gpu::texels_with`] | sizes that wrap, uses and formats without their features | sizes are checked before they are rounded; uses are Vulkan 1.0's; formats have known texels and the device's word |
 //! | [`Gpu::image`], [`Image::part`], [`Gpu::sampler`] | sizes, layers, formats, filters that the device lacks | asked of the device, or from a list |
 //! | [`Gpu::texel_view_of`] | a view past its buffer's end, or of another device's | whole texels of the buffer; device, use, alignment and limits |
+//! | [`Gpu::box_structure`] | boxes that drivers cannot build of, memory that goes while it is built | corners are finite and in order, counts within the limit; it waits for the build |
 //! | [`Buffer::write`], [`Buffer::read`] | races with threads and with the device; a count beyond the buffer | the buffer's lock, which a submission takes, too; an error while a submission that uses it is not over; the range, before memory is taken |
 //! | [`Gpu::upload`], [`Gpu::read`] | ranges past the end | the range; the staging memory is theirs alone |
-//! | [`Gpu::compute_pipeline`], [`Gpu::graphics_pipeline`] | modules that are not valid or not as their interface says | shaders are types of `unsafe` traits ([`ComputeShader`](interface::ComputeShader) …), which the build implements from reflection; a pipeline is found by its interface's place, not its name; workgroups, descriptors, formats and states are checked |
+//! | [`Gpu::compute_pipeline`], [`Gpu::ray_query_pipeline`], [`Gpu::graphics_pipeline`] | modules that are not valid or not as their interface says | shaders are types of `unsafe` traits ([`ComputeShader`](interface::ComputeShader) …), which the build implements from reflection; a pipeline is found by its interface's place, not its name; workgroups, descriptors, formats and states are checked |
 //! | `OwnKernel::wgsl`, [`Pass`]`::dispatch_own` | any source | validated; every index is checked in the kernel; bindings, sizes, overlaps and push constants where it is dispatched |
 //! | [`Pass::dispatch`], [`Pass::dispatch_indirect`], [`Render::draw`], [`Render::draw_indirect`] | foreign or missing resources, short push constants, too many workgroups | device, kind, use, range, alignment and limits of each binding; the size of push constants; counts from the host. Sets, push constants and specialization constants come by safe traits, and are checked for that |
 //! | [`Pass::fill`], [`Pass::update`], [`Pass::copy`] and those with images | ranges past the end, parts over each other | ranges, whole words, overlap, device and use |
@@ -95,6 +96,7 @@ mod resources;
 // A method of one kernel has a kernel of its name.
 #[allow(clippy::module_inception)]
 pub mod shaders;
+mod structure;
 mod submission;
 mod surface;
 mod texels;
@@ -113,7 +115,7 @@ pub use buffer::{Buffer, BufferDesc, BufferView, Residency};
 pub use caps::{Caps, DescriptorLimits, DeviceKind, SOFTWARE_LOOP_CAP, SubgroupOperations};
 pub use device::{Gpu, QueueGuard};
 pub use graphics::{Cull, DepthBias, GeometryStage, GraphicsDesc, GraphicsPipeline, NoGeometry};
-pub use host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures};
+pub use host::{DeviceFeatures, EnabledFeatures, HostDevice, OptionalFeatures, RAY_QUERY_EXTENSIONS};
 #[cfg(feature = "hot-reload")]
 pub use hot_reload::HotReload;
 pub use image::{Image, ImageDesc, Sampler, SamplerDesc};
@@ -129,6 +131,7 @@ pub use pipeline::{ComputePipeline, PipelineInfo};
 pub use recorded::Recorded;
 pub use recorder::{Pass, Recorder};
 pub use rendering::{Area, ClearColor, ColorTarget, DepthTarget, Render, Targets};
+pub use structure::{AccelerationStructure, StructureBox};
 pub use submission::Submission;
 pub use surface::{Presented, Surface};
 pub use texels::TexelView;

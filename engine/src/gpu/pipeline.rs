@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use ash::vk;
 
 use super::device::{Gpu, Inner};
-use super::interface::{ComputeShader, LocalSize, ShaderInfo, SpecConstants};
+use super::interface::{Capability, ComputeShader, LocalSize, ShaderInfo, SpecConstants};
 use super::layout::{PipelineObjects, ShaderModule, specialization_data};
 use crate::{Error, Result};
 
@@ -106,6 +106,30 @@ impl Gpu {
     pub fn compute_pipeline<K: ComputeShader>(&self, spec: &K::Spec) -> Result<ComputePipeline<K>> {
         self.inner.check_alive()?;
         let inner = self.shared_pipeline(K::info(), spec.values())?;
+        self.kept.keep(&inner);
+        Ok(ComputePipeline {
+            inner,
+            shader: PhantomData,
+        })
+    }
+
+    /// The pipeline of the module by ray queries that stands in for a kernel ([`ShaderInfo::ray_query`]): as [`Gpu::compute_pipeline`], to be dispatched as
+    /// the kernel, with set 1 of that module.
+    ///
+    /// # Errors
+    /// As [`Gpu::compute_pipeline`]; [`Error::MissingFeature`] on a device without [`Caps::ray_query`](super::Caps::ray_query), [`Error::Shader`] for a kernel
+    /// that has no such module.
+    pub fn ray_query_pipeline<K: ComputeShader>(&self, spec: &K::Spec) -> Result<ComputePipeline<K>> {
+        self.inner.check_alive()?;
+        let Some(info) = K::info().ray_query else {
+            return Err(Error::Shader {
+                name: K::info().name.into(),
+                message: "has no module by ray queries".into(),
+            });
+        };
+        let is_known = |(id, _): &(u32, u32)| info.spec_constants.iter().any(|constant| constant.id == *id);
+        let values = spec.values().into_iter().filter(is_known).collect();
+        let inner = self.shared_pipeline(info, values)?;
         self.kept.keep(&inner);
         Ok(ComputePipeline {
             inner,
@@ -233,6 +257,9 @@ impl PipelineInner {
             }
         });
         check_workgroup(gpu, info.name, local_size)?;
+        if info.capabilities.contains(&Capability::RayQuery) && !gpu.caps.ray_query {
+            return Err(gpu.lacks_ray_queries(info.name));
+        }
         let mut objects = PipelineObjects::new(gpu, &[info], 0)?;
         let module = ShaderModule::new(gpu, info.name, spirv)?;
         let (entries, data) = specialization_data(&spec);

@@ -185,13 +185,16 @@ fn descriptor_pool(inner: &Inner) -> Result<vk::DescriptorPool> {
         ty,
         descriptor_count: DESCRIPTORS_PER_POOL,
     };
-    let sizes = [
+    let mut sizes = vec![
         size(vk::DescriptorType::STORAGE_BUFFER),
         size(vk::DescriptorType::UNIFORM_BUFFER),
         size(vk::DescriptorType::STORAGE_IMAGE),
         size(vk::DescriptorType::COMBINED_IMAGE_SAMPLER),
         size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER),
     ];
+    if inner.caps.ray_query {
+        sizes.push(size(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR));
+    }
     let info = vk::DescriptorPoolCreateInfo::default()
         .max_sets(SETS_PER_POOL)
         .pool_sizes(&sizes);

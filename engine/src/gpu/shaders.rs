@@ -32,7 +32,9 @@
 //!    - `INFO`, the reflected interface.
 //!
 //!    A set that several shaders share is declared in one include whose line `// descriptor set 1: SceneSet` names it; it is then in
-//!    [`sets`], and the build fails when two shaders disagree on it. `readonly` and `writeonly` are taken at their word by the barrier
+//!    [`sets`], and the build fails when two shaders disagree on it. An entry file with the line `// variant: driver` among its first, of a kernel that
+//!    traverses the ray index, is compiled once more, for ray queries: the module `<name>_driver`, which
+//!    [`Gpu::ray_query_pipeline`](super::Gpu::ray_query_pipeline) loads on devices that have them. `readonly` and `writeonly` are taken at their word by the barrier
 //!    checks, so declare them.
 //!
 //! 3. **Record it.** Debug builds refuse a pass that misses a barrier.

@@ -59,7 +59,8 @@ impl TracePipelines {
     ) -> Result<Self> {
         let numbered = buffers.is_numbered();
         let work_least = work_least(gpu.caps().kind);
-        let (profile, index_kind) = (scene.profile(), scene.index_traversal().kind());
+        let (profile, traversal) = (scene.profile(), scene.index_traversal());
+        let index_kind = traversal.kind();
         let (has_alpha, has_media) = (profile.has_alpha(), profile.media.any());
         // Attributes are read for alpha alone.
         let has_textures = has_alpha && profile.has_textures;
@@ -92,8 +93,8 @@ impl TracePipelines {
             ..Default::default()
         };
         Ok(Self {
-            extend: gpu.compute_pipeline(&extend)?,
-            shadow: shadows.then(|| gpu.compute_pipeline(&shadow)).transpose()?,
+            extend: traversal.pipeline(gpu, &extend)?,
+            shadow: shadows.then(|| traversal.pipeline(gpu, &shadow)).transpose()?,
         })
     }
 

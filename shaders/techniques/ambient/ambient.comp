@@ -1,5 +1,6 @@
 #version 460
 // Ambient occlusion: what a uniform sky sends to the surface that a pixel shows, by one ray over its hemisphere. See techniques/ambient/mod.rs.
+// variant: driver
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 

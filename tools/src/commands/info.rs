@@ -222,6 +222,11 @@ impl DeviceInfo {
         ));
         let features = FEATURES.map(|name| (name, techniques::offers(caps, name) == Some(true)));
         lines.push(format!("  features     {}", names(&features)));
+        lines.push(if caps.ray_query {
+            "  ray indexes  all, driver too".into()
+        } else {
+            "  ray indexes  all but driver, for want of VK_KHR_ray_query".into()
+        });
         lines.push(format!(
             "  memory       {} heap, {} per allocation, {} per storage buffer, {} texels per texel buffer",
             output::bytes(caps.device_heap),

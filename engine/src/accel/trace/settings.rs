@@ -162,6 +162,8 @@ impl TraceSettings {
             DeviceTraversal::Wide => {
                 DeviceTraversal::wide_iterations(self.ray_quota, lanes_in_sum(caps, traversal), false)
             }
+            // Of rays that try all triangles.
+            DeviceTraversal::Driver => u64::from(self.ray_quota),
         };
         match self.execution {
             Execution::RayPerThread => ray,
@@ -182,6 +184,10 @@ impl TraceSettings {
     pub(super) fn check(&self, caps: &Caps, traversal: DeviceTraversal) -> Result<()> {
         check_range("trace.ray_quota", self.ray_quota, MAX_DEPTH + 1, u32::MAX)?;
         if let Execution::Persistent(threads) = self.execution {
+            if traversal == DeviceTraversal::Driver {
+                let cause = "is not for the driver's acceleration structure, which has one invocation per ray";
+                return Err(Error::setting("trace.execution", "persistent", cause));
+            }
             check_range("trace.groups", threads.groups, 1, 65_535)?;
             check_range("trace.batch", threads.batch, 1, 16_384)?;
             check_range("trace.fetches", threads.fetches, 1, u32::MAX)?;
@@ -225,7 +231,7 @@ fn group_size(caps: &Caps) -> u32 {
 /// Lanes whose loop iterations add up in a subgroup.
 fn lanes_in_sum(caps: &Caps, traversal: DeviceTraversal) -> u32 {
     match traversal {
-        DeviceTraversal::Bvh2 => 1,
+        DeviceTraversal::Bvh2 | DeviceTraversal::Driver => 1,
         DeviceTraversal::Kd { .. } | DeviceTraversal::Wide => caps.subgroup_size.max(1),
     }
 }

@@ -76,6 +76,7 @@ sources! {
     KHRONOS_GLTF = "khronos-gltf": "Khronos", "glTF 2.0 Specification", "", 0;
     KHRONOS_LIGHTS_PUNCTUAL = "khronos-lights-punctual": "Khronos", "KHR_lights_punctual", "glTF extension", 0;
     KHRONOS_MATERIALS_VOLUME = "khronos-materials-volume": "Khronos", "KHR_materials_volume", "glTF extension", 0;
+    KHRONOS_RAY_QUERY = "khronos-ray-query": "Khronos", "GLSL_EXT_ray_query", "GLSL extension", 0;
     KHRONOS_SPIRV = "khronos-spirv": "Khronos", "SPIR-V Specification", "", 0;
     KHRONOS_VULKAN = "khronos-vulkan": "Khronos", "Vulkan 1.3 Specification", "", 0;
     KIRK_ARVO_1991 = "kirk-arvo-1991": "D. Kirk, J. Arvo", "Unbiased Sampling Techniques for Image Synthesis", "SIGGRAPH", 1991;

@@ -98,6 +98,11 @@ fn check_capability(gpu: &Inner, shader: &ShaderInfo, capability: Capability) ->
             "shaderOutputLayer with VK_EXT_shader_viewport_index_layer",
             "choose the layer in a geometry shader, or render once for each layer",
         ),
+        Capability::RayQuery => (
+            gpu.caps.ray_query,
+            "VK_KHR_ray_query",
+            "query rays in a compute shader by an index of the engine's own",
+        ),
     };
     if offered {
         Ok(())

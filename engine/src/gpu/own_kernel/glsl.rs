@@ -36,11 +36,11 @@ pub(super) fn translate(name: &str, source: &str) -> Result<Module> {
             }
             Resource::Uniform { block } => (BindingKind::UniformBuffer, true, false, block.size()),
             Resource::TexelBuffer => (BindingKind::TexelBuffer, true, false, 0),
-            Resource::StorageImage { .. } | Resource::SampledImage => {
+            Resource::StorageImage { .. } | Resource::SampledImage | Resource::AccelerationStructure => {
                 return Err(Error::Binding {
                     kernel: name.into(),
                     binding: binding.name.clone(),
-                    cause: "is an image; a kernel of a host's own takes buffers".into(),
+                    cause: "is no buffer; a kernel of a host's own takes buffers".into(),
                 });
             }
         };

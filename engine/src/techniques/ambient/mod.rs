@@ -64,9 +64,10 @@ impl Ambient {
     /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) for an index whose leaves are too long for a software device.
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>) -> Result<Self> {
         let index = scene.index_within(gpu, SOFTWARE_LOOP_CAP / 2)?; // each of the two rays
-        let pipeline = gpu.compute_pipeline(&surface_spec!(kernel, scene, {
+        let spec = surface_spec!(kernel, scene, {
             index_quota: index.quota, index_kind: index.kind, ..Default::default()
-        }))?;
+        });
+        let pipeline = scene.index_traversal().pipeline(gpu, &spec)?;
         let steps = index.steps;
         Ok(Self { scene, pipeline, steps })
     }

@@ -30,10 +30,10 @@ use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
 use crate::accel::bvh2::Bvh2Settings;
-use crate::accel::{DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
+use crate::accel::{DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
-use crate::gpu::shaders::sets::{IndexSet, MediaSet, SceneSet};
+use crate::gpu::shaders::sets::{MediaSet, SceneSet};
 use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
 use crate::gpu::{Category, Gpu, SOFTWARE_LOOP_CAP, TexelView};
 use crate::raster::{ObjectTriangles, SurfaceFeatures, Surfaces};
@@ -151,7 +151,8 @@ impl GpuScene {
     /// as where thousands of triangles lie in one place, is replaced by the binned hierarchy, and the report says so ([`IndexReport::instead_because`]).
     ///
     /// # Errors
-    /// As [`GpuScene::new`], and [`Error::Setting`] for settings of the index that are out of range.
+    /// As [`GpuScene::new`], [`Error::Setting`] for settings of the index that are out of range, and [`Error::MissingFeature`] for one that the device
+    /// has not.
     pub fn with_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind) -> Result<Self> {
         Self::with_kept_index(gpu, scene, kind, None)
     }
@@ -243,7 +244,7 @@ impl GpuScene {
             quota,
             steps: match traversal {
                 // A step is a node or a triangle, of a texel or more, and none is met twice.
-                DeviceTraversal::Bvh2 => texels.min(quota.into()),
+                DeviceTraversal::Bvh2 | DeviceTraversal::Driver => texels.min(quota.into()),
                 // A round's further iterations beside a node's five texels and a triangle's three.
                 DeviceTraversal::Wide => (2 * texels).min(quota.into()),
                 DeviceTraversal::Kd { .. } => quota.into(),
@@ -374,10 +375,8 @@ impl GpuScene {
     }
 
     /// Set 1.
-    pub fn index_set(&self) -> IndexSet<'_> {
-        IndexSet {
-            index_texels: &self.index.texels,
-        }
+    pub fn index_set(&self) -> IndexBinding<'_> {
+        self.index.set()
     }
 
     /// Set 2.

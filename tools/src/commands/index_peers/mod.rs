@@ -1,7 +1,8 @@
 //! `clerestory index --peers`: build times, surface area cost and rays per second of our indexes beside those of other libraries, and where our
 //! rays' time goes.
 //!
-//! Ours are traced by the device's kernel, theirs on the processor with all threads; on a software device both share the same cores.
+//! Ours are traced by the device's kernel, theirs on the processor with all threads; on a software device both share the same cores. The driver's own
+//! acceleration structure is a peer where the device has ray queries.
 //! Primary rays go through the pixels of the scene's first camera; diffuse ones leave what these meet by the cosine. All tracers see the
 //! same rays in the same order, take turns, and medians count. Their hits are compared ray by ray with ours of the binned index, which are
 //! those of trying all triangles.
@@ -196,6 +197,12 @@ pub fn measure(gpu: &Gpu, settings: &Settings<'_>) -> Outcome<Found> {
         found.absent.push(format!("Embree: {reason}"));
     }
     let embree = embree.ok();
+    if !caps.ray_query {
+        let reason = "the device has no VK_KHR_ray_query";
+        found
+            .absent
+            .push(format!("the driver's acceleration structure: {reason}"));
+    }
     for address in settings.scenes {
         let scene = scene::load(address).map_err(Failure::scene)?;
         let triangles = triangles(&scene);
@@ -269,6 +276,9 @@ fn one_scene(
     let mut contenders = Vec::new();
     for one in &built {
         contenders.push(ours::contender(gpu, one, &rays)?);
+    }
+    if gpu.caps().ray_query {
+        contenders.push(ours::by_driver(gpu, triangles, &rays, repeat)?);
     }
     contenders.extend(crates::of_obvhs(&tested, &peer_rays, repeat)?);
     contenders.push(crates::of_bvh(triangles, &tested, &rays, &peer_rays, repeat)?);

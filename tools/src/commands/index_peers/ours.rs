@@ -1,21 +1,23 @@
-//! Our indexes in the comparison: built on the processor, traced by the device's kernel with an invocation per ray.
+//! Our indexes in the comparison: built on the processor, traced by the device's kernel with an invocation per ray. And the driver's, traced by the same
+//! kernel with ray queries.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::driver::DriverIndex;
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::trace::TraceSettings;
 use clerestory::accel::wide::{LEAF_SIZE, WideBvh, WideSettings};
-use clerestory::accel::{Hit, Ray, RayIndex};
+use clerestory::accel::{DeviceTraversal, Hit, IndexBinding, Ray, RayIndex};
 use clerestory::gpu::ash::vk::Format;
 use clerestory::gpu::shaders::accel::trace_rays;
-use clerestory::gpu::shaders::sets::IndexSet;
 use clerestory::gpu::{
-    Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, rw_compute_to_compute, transfer_to_compute,
+    AccelerationStructure, Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView, rw_compute_to_compute,
+    transfer_to_compute,
 };
 use clerestory::{Error, Result};
 use clerestory_tools::timing::timed;
 use glam::Vec3;
 
-use super::{Contender, Intersection, Spread, built_in};
+use super::{Contender, Intersection, Spread, Trace, built_in};
 
 /// An index of ours, whose traversal can be watched step by step.
 #[derive(Debug)]
@@ -97,14 +99,27 @@ struct Buffers {
 pub struct Kernel<'a> {
     gpu: &'a Gpu,
     pipeline: ComputePipeline<trace_rays::Kernel>,
-    quarters: TexelView,
+    texels: TexelView,
+    /// The driver's.
+    structure: Option<AccelerationStructure>,
     sets: Vec<Buffers>,
 }
 
 impl<'a> Kernel<'a> {
     /// Uploads them.
     pub fn new(gpu: &'a Gpu, index: &dyn RayIndex, sets: &[&[Ray]]) -> Result<Self> {
-        let traversal = index.device_traversal();
+        let format = Format::R32G32B32A32_UINT;
+        let texels = gpu.texels_with(index.name(), Category::Index, format, index.texels())?;
+        Self::of(gpu, texels, None, index.device_traversal(), sets)
+    }
+
+    fn of(
+        gpu: &'a Gpu,
+        texels: TexelView,
+        structure: Option<AccelerationStructure>,
+        traversal: DeviceTraversal,
+        sets: &[&[Ray]],
+    ) -> Result<Self> {
         // Few enough steps in one dispatch for software devices, which end long loops, and more than these rays need.
         let settings = TraceSettings::ray_per_thread().fitted(gpu.caps(), traversal);
         let spec = trace_rays::Spec {
@@ -126,11 +141,11 @@ impl<'a> Kernel<'a> {
                 count: rays.len() as u32,
             })
         };
-        let format = Format::R32G32B32A32_UINT;
         Ok(Self {
             gpu,
-            pipeline: gpu.compute_pipeline::<trace_rays::Kernel>(&spec)?,
-            quarters: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
+            pipeline: traversal.pipeline(gpu, &spec)?,
+            texels,
+            structure,
             sets: sets.iter().map(buffers).collect::<Result<_>>()?,
         })
     }
@@ -144,9 +159,7 @@ impl<'a> Kernel<'a> {
             trace_resume: buffers.resume.view(),
             trace_status: buffers.status.view(),
         };
-        let index = IndexSet {
-            index_texels: &self.quarters,
-        };
+        let index = IndexBinding::new(&self.texels, self.structure.as_ref());
         let mut recorder = self.gpu.recorder("trace")?;
         recorder.pass("trace", |pass| {
             pass.fill(buffers.status.view(), 0)?;
@@ -198,9 +211,34 @@ pub fn contender<'a>(gpu: &'a Gpu, built: &Built, rays: &[Vec<Ray>; 2]) -> Resul
         name: built.name.into(),
         build: built.build,
         sah_cost: Some(built.index.index().statistics().sah_cost),
-        trace: Box::new(move |kind| {
-            let seconds = kernel.trace(kind)?;
-            Ok((seconds, kernel.met(kind)?))
-        }),
+        trace: traced_by(kernel),
+    })
+}
+
+/// The driver's acceleration structure, built on the device, boxes and uploads included.
+pub fn by_driver<'a>(
+    gpu: &'a Gpu,
+    triangles: &[[Vec3; 3]],
+    rays: &[Vec<Ray>; 2],
+    repeat: u32,
+) -> Result<Contender<'a>> {
+    let (index, build) = built_in(repeat, || DriverIndex::build(gpu, triangles))?;
+    let DriverIndex {
+        structure, triangles, ..
+    } = index;
+    let traversal = DeviceTraversal::Driver;
+    let kernel = Kernel::of(gpu, triangles, Some(structure), traversal, &[&rays[0], &rays[1]])?;
+    Ok(Contender {
+        name: "driver, ray queries".into(),
+        build,
+        sah_cost: None,
+        trace: traced_by(kernel),
+    })
+}
+
+fn traced_by(kernel: Kernel<'_>) -> Trace<'_> {
+    Box::new(move |kind| {
+        let seconds = kernel.trace(kind)?;
+        Ok((seconds, kernel.met(kind)?))
     })
 }
