@@ -81,7 +81,7 @@ uint driver_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
     uvec4 header0 = driver_texel(0u);
     uvec4 header1 = driver_texel(1u);
     uint count = header1.w;
-    // Neither is a ray without a length for the driver.
+    // Drivers take rays of a length alone.
     if (resume == INDEX_FINISHED || count == 0u || !is_traceable(ray) || !(ray.t_min <= hit.t)) {
         return INDEX_FINISHED;
     }

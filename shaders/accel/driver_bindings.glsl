@@ -8,7 +8,7 @@
 
 // descriptor set 1: DriverSet
 
-// A grown box for each triangle. Where kernels of other indexes have their texels, so that neither can be given to the other.
+// A grown box for each triangle. It stands where kernels of other indexes have their texels: its type keeps either from being bound for the other.
 layout(set = 1, binding = 0) uniform accelerationStructureEXT driver_boxes;
 
 // The header, and triangles in the order of the structure's boxes, three texels each: vertex 0, 1, 2, the triangle's index, two that are unused.

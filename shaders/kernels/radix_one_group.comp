@@ -28,16 +28,40 @@ uint own_places[PAIRS];
 // By pair, then invocation: the same.
 shared uint places[PAIRS * LANES];
 
-uvec4 key_words(uint side, uint at) { return side == 0u ? radix_keys_a[at] : radix_keys_b[at]; }
+// Four words of a side's keys from `first` on, a multiple of four; behind `last` zeros, since there may be nothing to read.
+uvec4 key_words(uint side, uint first, uint last) {
+    uint at = first / 4u;
+    if (first + 4u <= last) {
+        return side == 0u ? radix_keys_a[at] : radix_keys_b[at];
+    }
+    uvec4 words = uvec4(0u);
+    for (uint i = 0u; i < 4u && first + i < last; ++i) {
+        words[i] = side == 0u ? radix_keys_a[at][i] : radix_keys_b[at][i];
+    }
+    return words;
+}
+
+// The same of values.
+uvec4 value_words(uint side, uint first, uint last) {
+    uint at = first / 4u;
+    if (first + 4u <= last) {
+        return side == 0u ? radix_values_a[at] : radix_values_b[at];
+    }
+    uvec4 words = uvec4(0u);
+    for (uint i = 0u; i < 4u && first + i < last; ++i) {
+        words[i] = side == 0u ? radix_values_a[at][i] : radix_values_b[at][i];
+    }
+    return words;
+}
 
 // Low and high words of the keys `first` to `first` + 3 of a side, as far as they lie before `last`.
 void load_keys(uint side, uint first, uint last, out uvec4 low, out uvec4 high) {
     if (KEY_WORDS == 1u) {
-        low = key_words(side, first / 4u);
+        low = key_words(side, first, last);
         high = uvec4(0u);
     } else {
-        uvec4 a = key_words(side, first / 2u);
-        uvec4 b = first + 2u < last ? key_words(side, first / 2u + 1u) : uvec4(0u);
+        uvec4 a = key_words(side, 2u * first, 2u * last);
+        uvec4 b = key_words(side, 2u * first + 4u, 2u * last);
         low = uvec4(a.xz, b.xz);
         high = uvec4(a.yw, b.yw);
     }
@@ -132,7 +156,7 @@ void main() {
             load_keys(from, at, last, low, high);
             uvec4 values = uvec4(0u);
             if (HAS_VALUES) {
-                values = from == 0u ? radix_values_a[at / 4u] : radix_values_b[at / 4u];
+                values = value_words(from, at, last);
             }
             put(to, radix_digit_at(low.x, high.x, bit, mask, flip), low.x, high.x, values.x);
             if (at + 1u < last) {

@@ -31,7 +31,7 @@ float cosine_bound(float along, float least, float greatest) {
     return clamp(along / max(along > 0.0 ? least : greatest, LIGHT_SQUARED_MIN), -1.0, 1.0);
 }
 
-// What the lights of a node may send to a point, W/(sr m2): intensity, over the square of a distance between that of their box and that of its
+// What the lights of a node may send to a point, relative to the strongest, 1/m2: intensity, over the square of a distance between that of their box and that of its
 // middle, times the greatest cosines at the lights and at the point. A `normal` of zero stands for points that scatter from all sides.
 float light_node_importance(SceneLightNode n, vec3 from, vec3 normal) {
     vec3 to = n.center - from;

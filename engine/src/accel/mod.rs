@@ -19,7 +19,7 @@
 //! which returns `INDEX_FINISHED`, or where to go on when the quota `INDEX_QUOTA` has stopped the ray; `resume` is `INDEX_START` at first and
 //! `hit` is `no_hit(ray.t_max)`. With `CLERESTORY_CANDIDATE_FILTER` defined it asks `accept_candidate` before a hit counts, and where
 //! `INDEX_RESUMES` is false no call goes on with a ray. It has a number of its own in `accel/index.glsl`, by which kernels are specialized
-//! ([`DeviceTraversal::kind`]): every kernel that traverses any index traverses this one, too. So do all but persistent threads by the driver's structure
+//! ([`DeviceTraversal::kind`]): every kernel that traverses any index traverses this one, too. Kernels but those of persistent threads also traverse the driver's structure
 //! ([`driver`]), from modules of their own, since devices without ray queries must not see those.
 
 mod aabb;

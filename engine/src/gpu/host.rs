@@ -169,7 +169,7 @@ impl EnabledFeatures {
         caps.int64_atomics &= optional.shader_buffer_int64_atomics;
         caps.ray_query &= optional.ray_query;
         if !caps.ray_query {
-            caps.max_structure_boxes = 0;
+            (caps.max_structure_boxes, caps.structure_scratch_alignment) = (0, 1);
         }
         caps.descriptor_indexing &= optional.descriptor_indexing;
         caps.full_subgroups &= optional.compute_full_subgroups;
@@ -302,12 +302,19 @@ impl DeviceFeatures {
             .push_next(&mut self.vulkan11)
             .push_next(&mut self.vulkan12)
             .push_next(&mut self.vulkan13);
-        // Devices without the extensions do not know their structs.
-        if self.ray_query.ray_query == vk::FALSE {
-            return info;
+        // Devices without an extension do not know its struct.
+        let structures = self.acceleration_structure.acceleration_structure != vk::FALSE;
+        let queries = self.ray_query.ray_query != vk::FALSE;
+        let info = if structures {
+            info.push_next(&mut self.acceleration_structure)
+        } else {
+            info
+        };
+        if queries {
+            info.push_next(&mut self.ray_query)
+        } else {
+            info
         }
-        info.push_next(&mut self.acceleration_structure)
-            .push_next(&mut self.ray_query)
     }
 
     /// What a physical device of this instance offers.

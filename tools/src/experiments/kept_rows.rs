@@ -1,7 +1,7 @@
 //! Rows of a measure that are kept, case by case, so that one that was stopped goes on where it was.
 //!
-//! A case's rows are known by a fingerprint of the program that measured them, the machine, the table, and the case's place and name; every build starts
-//! anew. Guarantees: a line that was cut off while it was written is skipped; a measure that has ended forgets what was kept, so that the next run measures.
+//! A case's rows are known by a fingerprint of the program that measured them, the machine, the device with its driver, the table, and the case's place and
+//! name; every build starts anew. Guarantees: a line that was cut off while it was written is skipped; a measure that has ended forgets what was kept, so that the next run measures.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -35,11 +35,11 @@ pub struct KeptRows {
 }
 
 impl KeptRows {
-    /// Reads what there is of a table.
+    /// Reads what there is of a table that a device, named with its driver, has a part in.
     ///
     /// # Errors
     /// [`Error::Io`] when a file is there and cannot be read.
-    pub fn open(folder: &Path, table: &str) -> Result<Self> {
+    pub fn open(folder: &Path, device: &str, table: &str) -> Result<Self> {
         let path = folder.join(FILE);
         let text = match read_file(&path, MOST_BYTES) {
             Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
@@ -49,7 +49,7 @@ impl KeptRows {
         Ok(Self {
             path,
             text,
-            table: format!("{}\n{}\n{table}", program()?, machine::processor()),
+            table: format!("{}\n{}\n{device}\n{table}", program()?, machine::processor()),
         })
     }
 
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn rows_are_found_again_by_their_case_and_forgotten_at_the_end() {
         let folder = tempfile::tempdir().unwrap();
-        let open = |table: &str| KeptRows::open(folder.path(), table).unwrap();
+        let open = |table: &str| KeptRows::open(folder.path(), "lavapipe", table).unwrap();
         assert_eq!(open("goals").add(0, "ring", vec![1.5, 2.5]).unwrap(), [1.5, 2.5]);
         open("goals").add(1, "ring", Vec::<f64>::new()).unwrap();
         assert_eq!(open("goals").get(0, "ring"), Some(vec![1.5, 2.5]));
@@ -127,6 +127,8 @@ mod tests {
         for (table, place, case) in [("goals", 2, "ring"), ("goals", 0, "room"), ("contests", 0, "ring")] {
             assert_eq!(open(table).get::<f64>(place, case), None, "{table} {place} {case}");
         }
+        let elsewhere = KeptRows::open(folder.path(), "another", "goals").unwrap();
+        assert_eq!(elsewhere.get::<f64>(0, "ring"), None);
         forget(folder.path()).unwrap();
         assert_eq!(open("goals").get::<f64>(0, "ring"), None);
         forget(folder.path()).unwrap();
@@ -135,7 +137,7 @@ mod tests {
     #[test]
     fn a_line_that_was_cut_off_is_skipped() {
         let folder = tempfile::tempdir().unwrap();
-        let open = || KeptRows::open(folder.path(), "goals").unwrap();
+        let open = || KeptRows::open(folder.path(), "lavapipe", "goals").unwrap();
         open().add(0, "ring", vec![1.5]).unwrap();
         let path = folder.path().join(FILE);
         let text = std::fs::read_to_string(&path).unwrap();

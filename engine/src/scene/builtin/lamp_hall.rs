@@ -63,7 +63,7 @@ fn build(values: &Values) -> Result<Scene> {
     let middles: Vec<Vec3> = (0..n)
         .map(|i| Vec3::new((i % side) as f32 + 0.5, 0.0, (i / side) as f32 + 0.5) * PITCH - Vec3::new(half, 0.0, half))
         .collect();
-    // A desk with as many others on each side as there are.
+    // The desk in the middle.
     let seen = ((side / 2) * side + side / 2).min(n - 1) as usize;
     let all_shine = values.word("lamps")? == "all";
     let mut desks = MeshBuilder::new("desks", wood);

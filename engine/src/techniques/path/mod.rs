@@ -31,7 +31,6 @@ use self::record::{EyeStages, ResolveTarget, record_resolve};
 pub use self::settings::{Adaptive, LightTreeUse, PathTracerSettings};
 pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
-use crate::Result;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
@@ -46,6 +45,7 @@ use crate::transport::GpuScene;
 use crate::walk::{
     ArrivalStage, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots, slots_of_device,
 };
+use crate::{Error, Result};
 use glam::DVec3;
 
 /// Exact counts of what the device did.
@@ -130,7 +130,11 @@ impl PathTracer {
         let slots = slots.min(slots_of_device(gpu)).min(slots_of_picture(size));
         let frame = CameraFrame::new(camera, size)?;
         let light_tree = if settings.light_tree.is_for(scene.near_light_count()) {
-            scene.light_tree(gpu)?
+            match scene.light_tree(gpu) {
+                // Power chooses among more lights than the tree has room for.
+                Err(Error::LimitExceeded { .. }) if settings.light_tree == LightTreeUse::Auto => None,
+                tree => tree?,
+            }
         } else {
             None
         };

@@ -32,10 +32,10 @@ use super::bsdf::BsdfFeatures;
 use crate::accel::bvh2::Bvh2Settings;
 use crate::accel::{DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
+use crate::gpu::shaders::constants::{self, SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::sets::{MediaSet, SceneSet};
 use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
-use crate::gpu::{Category, Gpu, SOFTWARE_LOOP_CAP, TexelView};
+use crate::gpu::{Category, DeviceKind, Gpu, SOFTWARE_LOOP_CAP, TexelView};
 use crate::raster::{ObjectTriangles, SurfaceFeatures, Surfaces};
 use crate::scene::{Environment, LightKind, Material, Scene, SceneProfile};
 use crate::{Error, Result};
@@ -237,8 +237,21 @@ impl GpuScene {
     /// [`Error::LimitExceeded`] for an index whose leaves are too long for a software device.
     pub fn index_within(&self, gpu: &Gpu, steps: u32) -> Result<IndexWithin> {
         let traversal = self.index.traversal;
-        let quota = traversal.quota_within(gpu.caps(), steps, steps, false)?;
+        let mut quota = traversal.quota_within(gpu.caps(), steps, steps, false)?;
         let texels = self.index.texels.buffer().bytes() / size_of::<[u32; 4]>() as u64;
+        // Rays from beyond its reach try all triangles.
+        let triangles = texels / u64::from(constants::DRIVER_TRIANGLE_TEXELS);
+        if traversal == DeviceTraversal::Driver && triangles > u64::from(quota) {
+            if gpu.caps().kind == DeviceKind::Cpu {
+                return Err(Error::LimitExceeded {
+                    name: "triangles in the driver's structure".into(),
+                    value: triangles,
+                    limit_name: "iterations of a software device's loops",
+                    limit: quota.into(),
+                });
+            }
+            quota = u32::try_from(triangles).unwrap_or(u32::MAX);
+        }
         Ok(IndexWithin {
             kind: traversal.kind(),
             quota,

@@ -92,13 +92,14 @@ impl Context<'_> {
         Ok(all)
     }
 
-    /// [`Context::each`] for cases that take minutes: rows of each are kept in the folder as soon as they are there, and a run that follows one that was
+    /// [`Context::each`] for cases that take minutes on a device: rows of each are kept in the folder as soon as they are there, and a run that follows one that was
     /// stopped begins with the first case that has none. Smoke runs keep nothing.
     ///
     /// # Errors
     /// The first of a case; [`Error::Io`].
     pub fn each_kept<C, R: Sheet + Serialize + DeserializeOwned>(
         &self,
+        gpu: &Gpu,
         cases: &[C],
         name: impl Fn(&C) -> String,
         mut rows: impl FnMut(&C) -> Result<Vec<R>>,
@@ -106,7 +107,8 @@ impl Context<'_> {
         if self.smoke {
             return self.each(cases, name, rows);
         }
-        let kept = KeptRows::open(self.folder, R::TITLE)?;
+        let device = format!("{}, {}", gpu.caps().device, gpu.caps().driver);
+        let kept = KeptRows::open(self.folder, &device, R::TITLE)?;
         let placed: Vec<(usize, String, &C)> = cases
             .iter()
             .enumerate()

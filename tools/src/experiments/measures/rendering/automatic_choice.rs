@@ -173,6 +173,7 @@ impl Study for Found {
         let pairs: &[(&str, Asked)] = context.pick(&PAIRS, &SMOKE_PAIRS);
         Ok(Self {
             goals: context.each_kept(
+                &gpu,
                 pairs,
                 |(address, _)| (*address).into(),
                 |(address, asked)| Ok(goal(context, &gpu, address, *asked)?.into_iter().collect()),

@@ -91,15 +91,17 @@ impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
         let name = |hall: &(&str, &str)| hall.0.to_owned();
-        let sizes = context.first(&FEW, 1);
+        let sizes = context.pick(&FEW[..], &FEW[FEW.len() - 1..]);
         let of_halls = HALLS.iter().flat_map(|(_, parameters)| {
             let address = move |n: &u32| format!("builtin:lamp-hall?n={n}&{parameters}");
             sizes.iter().map(address)
         });
         let few: Vec<String> = of_halls.chain(MESHES.map(str::to_owned)).collect();
         Ok(Self {
-            halls: context.each_kept(context.first(&HALLS, 1), name, |hall| of_hall(context, &gpu, hall))?,
-            few: context.each_kept(context.first(&few, 2), String::clone, |address| {
+            halls: context.each_kept(&gpu, context.first(&HALLS, 1), name, |hall| {
+                of_hall(context, &gpu, hall)
+            })?,
+            few: context.each_kept(&gpu, context.first(&few, 2), String::clone, |address| {
                 of_few(context, &gpu, address)
             })?,
         })

@@ -167,6 +167,7 @@ impl Study for Found {
         let contests: &[Contest] = context.pick(&CONTESTS, &SMOKE_CONTESTS);
         Ok(Self {
             contests: context.each_kept(
+                &gpu,
                 contests,
                 |contest| contest.address.into(),
                 |contest| Ok(contest.held(context, &gpu)?.into_iter().collect()),
