@@ -66,10 +66,8 @@ pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, spent: f64, round
 /// Fewest samples per pixel of the last pair of a picture of `wanted`: as many as the error's law holds from, but no more than the picture has, nor than
 /// those of the last round, after which there may be no time for more; and as many as the first round had.
 fn least_of_last_pair(samples_least: u32, last_round_spp: u32, wanted: u32) -> u32 {
-    samples_least
-        .min(last_round_spp)
-        .min(wanted)
-        .clamp(ROUNDS[0], LAST_PAIR)
+    let least = samples_least.min(last_round_spp).min(wanted);
+    least.clamp(ROUNDS[0], LAST_PAIR)
 }
 
 /// Further rounds for what can still be chosen, and for what that is held against, as long as they cost little beside the picture itself. Every trial is
