@@ -5,6 +5,7 @@ use clerestory::accel::IndexKind;
 use std::sync::Arc;
 
 use clerestory::accel::bvh2::Bvh2Settings;
+use clerestory::accel::driver::DRIVER_REACH;
 use clerestory::accel::kd::KdSettings;
 use clerestory::accel::wide::WideSettings;
 use clerestory::film::picture::{NORMAL, VARIANCE};
@@ -179,12 +180,14 @@ fn alpha_and_media_leave_pictures_by_the_drivers_structure_the_same() {
             println!("not supported: VK_KHR_ray_query");
             return;
         }
-        // From 30 times the city's size, so that camera rays try all triangles, and stop.
+        // So far away that camera rays try all triangles, and stop.
         let mut far = thin("builtin:box-city?n=60");
+        let [lower, upper] = GpuScene::new(gpu, &far).unwrap().bounds();
+        let away = 2.0 * DRIVER_REACH;
         let camera = &mut far.cameras[0];
         let back = camera.transform.matrix3.z_axis;
-        camera.transform.translation += 5000.0 * back;
-        camera.projection = Projection::Perspective { fov_y: 0.03 };
+        camera.transform.translation += f64::from(away * (upper - lower).max_element()) * back;
+        camera.projection = Projection::Perspective { fov_y: 1.0 / away };
         let scenes = [
             ("thin city", thin("builtin:box-city?n=60")),
             ("smoke", builtin("builtin:smoke")),

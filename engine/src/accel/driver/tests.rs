@@ -29,7 +29,7 @@ fn boxes_hold_what_the_triangle_test_reports_of_rays_within_reach() {
         let bounds = triangles.iter().map(bounds_of).fold(Aabb::EMPTY, Aabb::union);
         let frame = Frame::around(&bounds);
         let far = |random: &mut Random| {
-            let origin = centre + random.choose(&[3.0, 12.0, 90.0]) * size * random.direction();
+            let origin = centre + random.choose(&[3.0, 12.0, 200.0]) * size * random.direction();
             Ray::new(origin, random.choose(&triangles)[0] - origin)
         };
         let mut rays: Vec<Ray> = (0..600).map(|_| far(&mut random)).collect();
