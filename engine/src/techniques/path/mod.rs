@@ -113,7 +113,7 @@ impl PathTracer {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::MissingFeature`](crate::Error::MissingFeature).
+    /// [`Error::Setting`] for a setting or size out of range, [`Error::OutOfMemory`], [`Error::MissingFeature`].
     pub fn new(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -194,7 +194,7 @@ impl PathTracer {
     /// Forgets everything gathered so far and looks through another camera.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for a camera that cannot be used, [`Error::DeviceLost`](crate::Error::DeviceLost).
+    /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         let frame = CameraFrame::new(camera, self.film.size())?;
         let pipeline = camera_pipeline(&self.gpu, &self.settings, &frame, camera)?;
@@ -209,7 +209,7 @@ impl PathTracer {
     /// Forgets everything gathered so far and goes on with another seed: an independent picture of the same view, with the kernels there are.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn restart(&mut self, seed: u32) -> Result<()> {
         self.film.clear()?;
         self.settings.seed = seed;
@@ -233,7 +233,7 @@ impl PathTracer {
     /// more than one goes on with the next step where it was, and its samples count once all of its paths have ended. The first wave also compiles the kernels.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::Overflow`](crate::Error::Overflow) should the index have rays that never end.
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         self.step_with(samples, None)
     }
@@ -350,7 +350,7 @@ impl PathTracer {
     /// samples that were left out because they were not finite.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
         self.flush()?;
         self.film.picture()
@@ -360,7 +360,7 @@ impl PathTracer {
     /// and sRGB-encoded.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) when the buffer is too small, [`Error::DeviceLost`](crate::Error::DeviceLost).
+    /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
     pub fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
         self.flush()?;
         self.film.display(target, exposure, format)
