@@ -12,15 +12,19 @@
 //! traversal returns exactly what trying all triangles in index order returns.
 
 mod collapse;
+mod frame;
 mod grid;
+mod refit;
 mod slots;
 pub mod traverse;
 
+pub use refit::refit;
 pub use traverse::WideTraversal;
 
 use super::bvh2::{Bvh2, Bvh2Triangle};
 use super::input::check_range;
 use super::lbvh::{self, LbvhSettings};
+use super::stages::Stopwatch;
 use super::{
     Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
 };
@@ -175,6 +179,36 @@ impl WideBvh {
         collapse::collapse(binary, settings.triangle_cost)
     }
 
+    /// Nodes and triangles with the header before them, measured; of `statistics` the counts of triangles and the depth are given.
+    fn assembled(
+        nodes: &[WideNode],
+        triangles: &[Bvh2Triangle],
+        bounds: &Aabb,
+        mut statistics: IndexStatistics,
+        mut stages: BuildStages,
+    ) -> Self {
+        let mut watch = Stopwatch::start();
+        measure(nodes, bounds, &mut statistics);
+        let header = Header {
+            lower: bounds.lower,
+            triangles: constants::WIDE_HEADER_TEXELS + constants::WIDE_NODE_TEXELS * nodes.len() as u32,
+            upper: bounds.upper,
+            zero: 0,
+        };
+        let mut texels: Vec<[u32; 4]> = Vec::with_capacity(header.triangles as usize + 3 * triangles.len());
+        texels.extend(bytemuck::cast::<Header, [[u32; 4]; 2]>(header));
+        texels.extend_from_slice(bytemuck::cast_slice(nodes));
+        texels.extend_from_slice(bytemuck::cast_slice(triangles));
+        statistics.bytes = size_of_val(texels.as_slice()) as u64;
+        stages.statistics += watch.lap();
+        Self {
+            nodes: nodes.len(),
+            texels,
+            statistics,
+            stages,
+        }
+    }
+
     /// Nodes; the root is the first.
     pub fn nodes(&self) -> &[WideNode] {
         let first = constants::WIDE_HEADER_TEXELS as usize;
@@ -195,6 +229,25 @@ impl WideBvh {
             upper: header.upper,
         }
     }
+}
+
+/// Counts nodes and leaves, and sums the SAH cost of decoded boxes.
+fn measure(nodes: &[WideNode], bounds: &Aabb, statistics: &mut IndexStatistics) {
+    let (mut cost, mut leaves) = (0.0, 0);
+    for node in nodes {
+        for slot in 0..SLOTS {
+            let count = node.leaf(slot).1;
+            let tests = if node.child(slot).is_some() { 1 } else { count };
+            let [lower, upper] = node.bounds(slot);
+            let e = upper - lower;
+            cost += f64::from(tests) * (e.x * e.y + e.y * e.z + e.z * e.x);
+            leaves += u64::from(count > 0);
+        }
+    }
+    let root = bounds.half_area();
+    statistics.nodes = nodes.len() as u64;
+    statistics.leaves = leaves;
+    statistics.sah_cost = if root > 0.0 { 1.0 + cost / root } else { 0.0 };
 }
 
 fn check_triangle_cost(settings: &WideSettings) -> Result<()> {

@@ -557,7 +557,8 @@ impl LbvhBuilder {
         let Some(buffers) = &build.buffers else {
             return Ok((super::refit(&build.index, triangles)?, Timings::default()));
         };
-        check_moved(&build.index, triangles)?;
+        let before = build.index.statistics();
+        check_moved(&before, build.index.triangles(), triangles)?;
         let mut indices: Vec<u32> = build.index.triangles().iter().map(|t| t.index).collect();
         indices.sort_unstable();
         let corners = moved_corners(&indices, triangles);
@@ -565,15 +566,8 @@ impl LbvhBuilder {
         let mut recorder = self.gpu.recorder("lbvh refit")?;
         self.record_refit(&mut recorder, buffers)?;
         let timings = recorder.submit()?.wait()?;
-        let before = build.index.statistics();
-        let statistics = IndexStatistics {
-            triangles: before.triangles,
-            excluded_range: before.excluded_range,
-            excluded_degenerate: before.excluded_degenerate,
-            ..IndexStatistics::default()
-        };
         let nodes = build.index.nodes().len() as u32;
-        Ok((self.read(buffers, nodes, statistics)?, timings))
+        Ok((self.read(buffers, nodes, before.of_triangles())?, timings))
     }
 
     /// The finished index, of whose triangles `statistics` has the counts.

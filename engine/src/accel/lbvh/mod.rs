@@ -17,6 +17,7 @@ pub use codes::SortedCodes;
 pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
 pub use device_buffers::LbvhBuffers;
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};
+pub(in crate::accel) use ray_index::{check_moved, moved_corners};
 
 use crate::catalogue::{Role, Row, sources};
 
