@@ -12,12 +12,16 @@
 //! traversal returns exactly what trying all triangles in index order returns.
 
 mod collapse;
+mod device;
+mod device_refit;
 mod frame;
 mod grid;
 mod refit;
 mod slots;
 pub mod traverse;
 
+pub use device::{ResidentWide, WideBuffers, WideBuild, WideBuilder};
+pub use device_refit::{RefittableWide, WideRefitter};
 pub use refit::refit;
 pub use traverse::WideTraversal;
 
@@ -53,7 +57,8 @@ const _: () = assert!(
     NODE_TEXELS == constants::WIDE_NODE_TEXELS as usize
         && size_of::<Header>() == 16 * constants::WIDE_HEADER_TEXELS as usize
         && size_of::<Bvh2Triangle>() == 16 * constants::WIDE_TRIANGLE_TEXELS as usize
-        && MAX_DEPTH >= super::bvh2::MAX_DEPTH,
+        && MAX_DEPTH >= super::bvh2::MAX_DEPTH
+        && MAX_DEPTH <= constants::WIDE_LEVELS,
     "the kernels have another layout"
 );
 
@@ -184,29 +189,40 @@ impl WideBvh {
         nodes: &[WideNode],
         triangles: &[Bvh2Triangle],
         bounds: &Aabb,
-        mut statistics: IndexStatistics,
-        mut stages: BuildStages,
+        statistics: IndexStatistics,
+        stages: BuildStages,
     ) -> Self {
-        let mut watch = Stopwatch::start();
-        measure(nodes, bounds, &mut statistics);
         let header = Header {
             lower: bounds.lower,
-            triangles: constants::WIDE_HEADER_TEXELS + constants::WIDE_NODE_TEXELS * nodes.len() as u32,
+            triangles: first_triangle_texel(nodes.len()) as u32,
             upper: bounds.upper,
             zero: 0,
         };
-        let mut texels: Vec<[u32; 4]> = Vec::with_capacity(header.triangles as usize + 3 * triangles.len());
+        let mut texels: Vec<[u32; 4]> = Vec::with_capacity(texels_of(nodes.len(), triangles.len()));
         texels.extend(bytemuck::cast::<Header, [[u32; 4]; 2]>(header));
         texels.extend_from_slice(bytemuck::cast_slice(nodes));
         texels.extend_from_slice(bytemuck::cast_slice(triangles));
-        statistics.bytes = size_of_val(texels.as_slice()) as u64;
-        stages.statistics += watch.lap();
-        Self {
-            nodes: nodes.len(),
+        Self::of_texels(texels, nodes.len(), statistics, stages)
+    }
+
+    /// What lies in memory, measured; of `statistics` as for [`WideBvh::assembled`].
+    fn of_texels(texels: Vec<[u32; 4]>, nodes: usize, statistics: IndexStatistics, mut stages: BuildStages) -> Self {
+        let mut watch = Stopwatch::start();
+        let mut index = Self {
+            nodes,
             texels,
             statistics,
             stages,
-        }
+        };
+        let (bytes, bounds) = (size_of_val(index.texels.as_slice()), index.bounds());
+        let mut statistics = IndexStatistics {
+            bytes: bytes as u64,
+            ..statistics
+        };
+        measure(index.nodes(), &bounds, &mut statistics);
+        stages.statistics += watch.lap();
+        (index.statistics, index.stages) = (statistics, stages);
+        index
     }
 
     /// Nodes; the root is the first.
@@ -217,8 +233,7 @@ impl WideBvh {
 
     /// Triangles in the order of leaves.
     pub fn triangles(&self) -> &[Bvh2Triangle] {
-        let first = constants::WIDE_HEADER_TEXELS as usize + NODE_TEXELS * self.nodes;
-        bytemuck::cast_slice(&self.texels[first..])
+        bytemuck::cast_slice(&self.texels[first_triangle_texel(self.nodes)..])
     }
 
     /// Box of all triangles; a point where there are none.
@@ -229,6 +244,16 @@ impl WideBvh {
             upper: header.upper,
         }
     }
+}
+
+/// Where triangles begin behind so many nodes.
+fn first_triangle_texel(nodes: usize) -> usize {
+    constants::WIDE_HEADER_TEXELS as usize + NODE_TEXELS * nodes
+}
+
+/// Texels of a tree.
+fn texels_of(nodes: usize, triangles: usize) -> usize {
+    first_triangle_texel(nodes) + constants::WIDE_TRIANGLE_TEXELS as usize * triangles
 }
 
 /// Counts nodes and leaves, and sums the SAH cost of decoded boxes.

@@ -73,10 +73,10 @@ pub struct ResidentLbvh {
 }
 
 /// What a build leaves on the device.
-struct Ran {
-    buffers: LbvhBuffers,
+pub(in crate::accel) struct Ran {
+    pub(in crate::accel) buffers: LbvhBuffers,
     state: LbvhState,
-    timings: Timings,
+    pub(in crate::accel) timings: Timings,
 }
 
 impl LbvhBuilder {
@@ -455,7 +455,7 @@ impl LbvhBuilder {
 
     /// Builds over triangles that rays can meet, at least two; a tree that was too deep is made again with fewer bits, in passes of the
     /// same names.
-    fn run(&self, corners: &[[Vec3; 3]], indices: &[u32]) -> Result<Ran> {
+    pub(in crate::accel) fn run(&self, corners: &[[Vec3; 3]], indices: &[u32]) -> Result<Ran> {
         let buffers = self.buffers(corners.len() as u32)?;
         self.gpu.upload(&buffers.corners, 0, corners)?;
         self.gpu.upload(&buffers.indices, 0, indices)?;
@@ -580,7 +580,7 @@ impl LbvhBuilder {
 }
 
 /// Milliseconds of the passes by stage.
-fn stages_of(timings: &Timings) -> BuildStages {
+pub(in crate::accel) fn stages_of(timings: &Timings) -> BuildStages {
     let mut stages = BuildStages::default();
     for pass in &timings.passes {
         let stage = match pass.name.as_str() {

@@ -14,6 +14,7 @@ mod ray_index;
 mod sort;
 
 pub use codes::SortedCodes;
+pub(in crate::accel) use device::stages_of;
 pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
 pub use device_buffers::LbvhBuffers;
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};

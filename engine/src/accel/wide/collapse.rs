@@ -241,19 +241,20 @@ impl Writer<'_> {
     }
 }
 
-pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
-    let largest = binary
-        .nodes()
-        .iter()
-        .flat_map(|node| node.children)
-        .map(|word| word & COUNT_MASK);
-    if let Some(size) = largest.max().filter(|size| *size > LEAF_SIZE) {
-        return Err(Error::setting(
-            "leaf size",
-            size,
-            format!("is above {LEAF_SIZE}, the most of a wide tree"),
-        ));
+/// Refuses a tree whose leaves are larger than slots.
+pub(super) fn check_leaves(binary: &Bvh2) -> Result<()> {
+    let words = binary.nodes().iter().flat_map(|node| node.children);
+    match words.map(|word| word & COUNT_MASK).max() {
+        Some(size) if size > LEAF_SIZE => {
+            let cause = format!("is above {LEAF_SIZE}, the most of a wide tree");
+            Err(Error::setting("leaf size", size, cause))
+        }
+        _ => Ok(()),
     }
+}
+
+pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
+    check_leaves(binary)?;
     let mut watch = Stopwatch::start();
     let mut statistics = binary.statistics();
     let mut stages = binary.stages();
