@@ -5,8 +5,9 @@
 //! f64 test.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
-use clerestory::accel::wide::{WideBvh, WideSettings, WideTraversal};
+use clerestory::accel::wide::{LEAF_SIZE, WideBuilder, WideBvh, WideRefitter, WideSettings, WideTraversal, refit};
 use clerestory::accel::{FINISHED, Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::{DeviceKind, Gpu};
 use clerestory::scene::{Instance, Scene};
@@ -232,6 +233,185 @@ fn kernels_give_a_million_rays_the_hits_of_the_binary_tree() {
             assert!(met > count / 4, "{address}: {met} hits");
             for ((ray, expected), found) in rays.iter().zip(&expected).zip(&found) {
                 assert_eq!(hit_bits(expected), hit_bits(found), "{address}: {ray:?}");
+            }
+        }
+    });
+}
+
+/// Settings of what the device builds, and the host likewise.
+fn on_device(code_bits: u32, triangle_cost: f32) -> WideSettings {
+    WideSettings {
+        binary: LbvhSettings {
+            code_bits,
+            leaf_size: LEAF_SIZE,
+            quality: BuildQuality::Fast,
+            ..LbvhSettings::default()
+        },
+        triangle_cost,
+    }
+}
+
+/// Triangles of the hard cases, and of soups with some that rays cannot meet.
+fn sets_of_triangles() -> Vec<(String, Vec<[Vec3; 3]>)> {
+    let mut random = Random(53);
+    let mut sets: Vec<_> = cases().into_iter().map(|case| (case.what, case.triangles)).collect();
+    for count in [2, 3, 4, 9, 64, 1000, 20_000] {
+        let mut soup: Vec<[Vec3; 3]> = (0..count)
+            .map(|_| {
+                let centre = 10.0 * random.vector();
+                [0; 3].map(|_| centre + 0.3 * random.vector())
+            })
+            .collect();
+        if count > 100 {
+            soup[7][1].z = f32::NAN;
+            soup[8][1] = soup[8][0];
+            soup[9].iter_mut().for_each(|v| v.x = -0.0);
+            soup[11] = soup[10];
+        }
+        sets.push((format!("soup of {count}"), soup));
+    }
+    sets
+}
+
+fn assert_same(found: &WideBvh, expected: &WideBvh, what: &str) {
+    let (nodes, others) = (found.nodes(), expected.nodes());
+    assert_eq!(nodes.len(), others.len(), "{what}");
+    for (place, (node, other)) in nodes.iter().zip(others).enumerate() {
+        assert_eq!(node, other, "{what}: node {place}");
+    }
+    assert!(found.texels() == expected.texels(), "{what}");
+    assert_eq!(found.statistics(), expected.statistics(), "{what}");
+}
+
+#[test]
+fn device_builds_are_the_twins() {
+    with_gpu(|gpu| {
+        let sets = sets_of_triangles();
+        for settings in [on_device(30, 0.4), on_device(63, 2.0)] {
+            let builder = WideBuilder::new(gpu, &settings).unwrap();
+            for (what, triangles) in &sets {
+                let build = builder.build(triangles).unwrap();
+                let host = WideBvh::build(triangles, &settings).unwrap();
+                assert_same(&build.index, &host, what);
+                let Some(resident) = builder.build_resident(triangles).unwrap() else {
+                    assert!(host.statistics().triangles < 2, "{what}");
+                    continue;
+                };
+                for stage in ["costs", "nodes"] {
+                    assert_eq!(build.timings.count(&format!("wide: {stage}")), 1, "{what}: {stage}");
+                }
+                let texels = host.texels();
+                let there: Vec<[u32; 4]> = gpu.read(resident.texels.buffer().view(), texels.len()).unwrap();
+                assert!(there == texels, "{what}");
+                let mut statistics = resident.statistics;
+                assert!(statistics.bytes >= host.statistics().bytes, "{what}");
+                statistics.bytes = host.statistics().bytes;
+                assert_eq!(statistics, host.statistics(), "{what}");
+            }
+        }
+    });
+}
+
+#[test]
+fn host_trees_are_collapsed_by_the_device_as_by_the_host() {
+    with_gpu(|gpu| {
+        let settings = WideSettings::default();
+        let builder = WideBuilder::new(gpu, &settings).unwrap();
+        let binned = |leaf_size| Bvh2Settings {
+            leaf_size,
+            ..Bvh2Settings::default()
+        };
+        for (what, triangles) in &sets_of_triangles() {
+            let trees = [
+                lbvh::build(triangles, &settings.binary).unwrap(),
+                Bvh2::build(triangles, &binned(1)).unwrap(),
+            ];
+            for tree in trees {
+                let device = builder.collapse(&tree).unwrap();
+                assert_same(&device.index, &WideBvh::collapse(&tree, &settings).unwrap(), what);
+            }
+        }
+        let heap = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 40];
+        let large = Bvh2::build(&heap, &binned(8)).unwrap();
+        assert!(builder.collapse(&large).is_err());
+        assert!(builder.buffers(1).is_err());
+    });
+}
+
+#[test]
+fn a_build_and_rays_go_into_one_submission() {
+    with_gpu(|gpu| {
+        let (triangles, rays) = soup();
+        let of_device = on_device(30, 0.4);
+        let builder = WideBuilder::new(gpu, &of_device).unwrap();
+        let count = triangles.len() as u32;
+        let binary = builder.binary().buffers(count).unwrap();
+        let buffers = builder.buffers(count).unwrap();
+        let indices: Vec<u32> = (0..count).collect();
+        gpu.upload(&binary.corners, 0, &triangles).unwrap();
+        gpu.upload(&binary.indices, 0, &indices).unwrap();
+        let mut recorder = gpu.recorder("wide").unwrap();
+        builder.record(&mut recorder, &binary, &buffers).unwrap();
+        recorder.submit().unwrap().wait().unwrap();
+        let host = WideBvh::build(&triangles, &of_device).unwrap();
+        let asked = settings(Query::Closest, QUOTA).fitted(gpu.caps(), host.device_traversal());
+        let tracer = RayTracer::with_texels(gpu, buffers.texels.clone(), host.device_traversal(), &asked).unwrap();
+        let hits = tracer.trace(&rays).unwrap().hits;
+        for (ray, hit) in rays.iter().zip(&hits) {
+            assert!(!misses(&triangles, ray, hit), "{ray:?}");
+        }
+        let texels: Vec<[u32; 4]> = gpu.read(buffers.texels.buffer().view(), host.texels().len()).unwrap();
+        assert!(texels == host.texels());
+        let few = builder.buffers(count - 1).unwrap();
+        let mut recorder = gpu.recorder("wide").unwrap();
+        assert!(builder.record(&mut recorder, &binary, &few).is_err());
+    });
+}
+
+/// What is moved by up to a twentieth of its size, some of it to where it has no area.
+fn moved(triangles: &[[Vec3; 3]], random: &mut Random) -> Vec<[Vec3; 3]> {
+    let places = triangles.iter().flatten().filter(|v| v.abs().max_element() < 1e9);
+    let size = places.fold(0.0f32, |size, v| size.max(v.abs().max_element()));
+    let mut triangles = triangles.to_vec();
+    for (i, triangle) in triangles.iter_mut().enumerate() {
+        let shift = 0.05 * size * random.vector();
+        triangle
+            .iter_mut()
+            .for_each(|v| *v = (*v + shift).clamp(Vec3::splat(-size), Vec3::splat(size)));
+        if i % 30 == 4 {
+            triangle[1] = triangle[0];
+        }
+    }
+    triangles
+}
+
+#[test]
+fn device_refits_are_the_twins() {
+    with_gpu(|gpu| {
+        let mut random = Random(54);
+        let refitter = WideRefitter::new(gpu).unwrap();
+        let builder = WideBuilder::new(gpu, &on_device(30, 0.4)).unwrap();
+        for (what, triangles) in &sets_of_triangles() {
+            let before = WideBvh::build(triangles, &WideSettings::default()).unwrap();
+            let there = refitter.upload(&before).unwrap();
+            assert!(there.bytes() >= before.statistics().bytes, "{what}");
+            let (same, _) = refitter.refit(&there, &before, triangles).unwrap();
+            assert_same(&same, &before, what);
+            // Twice, since a refit begins from what the last one left.
+            for _ in 0..2 {
+                let triangles = moved(triangles, &mut random);
+                let (device, _) = refitter.refit(&there, &before, &triangles).unwrap();
+                assert_same(&device, &refit(&before, &triangles).unwrap(), what);
+            }
+            if let Some(resident) = builder.build_resident(triangles).unwrap() {
+                let before = builder.build(triangles).unwrap().index;
+                let there = refitter.resident(&resident).unwrap();
+                let triangles = moved(triangles, &mut random);
+                let (device, _) = refitter.refit(&there, &before, &triangles).unwrap();
+                assert_same(&device, &refit(&before, &triangles).unwrap(), what);
+            }
+            if !triangles.is_empty() {
+                assert!(refitter.refit(&there, &before, &triangles[1..]).is_err(), "{what}");
             }
         }
     });

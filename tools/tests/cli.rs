@@ -615,7 +615,10 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
     refuse(
         &["render", "--index", "octree"],
         2,
-        &["octree", "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd, wide"],
+        &[
+            "octree",
+            "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd, wide, wide-device",
+        ],
     )?;
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;
     refuse(&["scenes", "nothing"], 2, &["ring"])?;

@@ -11,7 +11,7 @@ use std::time::Instant;
 use super::bvh2::{Bvh2, Bvh2Settings};
 use super::kd::{KdSettings, KdTree};
 use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
-use super::wide::{WideBvh, WideSettings};
+use super::wide::{WideBuilder, WideBvh, WideSettings};
 use super::{BuildStages, DeviceTraversal, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::{Category, Gpu, TexelView};
@@ -34,6 +34,8 @@ pub enum IndexKind {
     Kd(KdSettings),
     /// Eight children a node, compressed, made of the optimised linear hierarchy.
     Wide(WideSettings),
+    /// The same made of the linear hierarchy as its codes spell it, both by the device where a scene is uploaded, and left there.
+    WideOnDevice(WideSettings),
 }
 
 impl Default for IndexKind {
@@ -44,8 +46,8 @@ impl Default for IndexKind {
 
 impl IndexKind {
     /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
-    /// the device, the kd-tree, and the wide hierarchy.
-    pub const NAMES: [&'static str; 6] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide"];
+    /// the device, the kd-tree, the wide hierarchy, and one built by the device.
+    pub const NAMES: [&'static str; 7] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide", "wide-device"];
 
     /// The linear hierarchy with default settings.
     pub fn lbvh(quality: BuildQuality) -> Self {
@@ -66,6 +68,7 @@ impl IndexKind {
             Self::LbvhOnDevice(_) => "lbvh-device",
             Self::Kd(_) => "kd",
             Self::Wide(_) => "wide",
+            Self::WideOnDevice(_) => "wide-device",
         }
     }
 
@@ -78,15 +81,13 @@ impl IndexKind {
         Ok(match self {
             Self::Bvh2(settings) => Box::new(Bvh2::build(triangles, settings)?),
             Self::Lbvh(settings) => Box::new(lbvh::build(triangles, settings)?),
-            Self::LbvhOnDevice(settings) => {
-                let settings = LbvhSettings {
-                    quality: BuildQuality::Fast,
-                    ..*settings
-                };
-                Box::new(lbvh::build(triangles, &settings)?)
-            }
+            Self::LbvhOnDevice(settings) => Box::new(lbvh::build(triangles, &as_codes_spell_it(settings))?),
             Self::Kd(settings) => Box::new(KdTree::build(triangles, settings)?),
             Self::Wide(settings) => Box::new(WideBvh::build(triangles, settings)?),
+            Self::WideOnDevice(settings) => {
+                let binary = as_codes_spell_it(&settings.binary);
+                Box::new(WideBvh::build(triangles, &WideSettings { binary, ..*settings })?)
+            }
         })
     }
 
@@ -110,33 +111,31 @@ impl IndexKind {
         folder: Option<&Path>,
     ) -> Result<IndexOnDevice> {
         let mut fallback = None;
-        if let Self::LbvhOnDevice(settings) = self {
-            let builder = LbvhBuilder::new(gpu, settings)?;
-            let begin = Instant::now();
-            match builder.build_resident(triangles) {
-                Ok(Some(built)) => {
-                    let report = IndexReport {
-                        kind: self.name(),
-                        build_ms: 1e3 * begin.elapsed().as_secs_f64(),
-                        stages: built.stages,
-                        host_because: None,
-                        instead_because: None,
-                        kept: None,
-                        statistics: built.statistics,
-                    };
-                    return Ok(IndexOnDevice {
-                        texels: built.quarters,
-                        traversal: DeviceTraversal::Bvh2,
-                        report,
-                    });
-                }
-                Ok(None) => fallback = Some("fewer than two triangles that rays can meet"),
-                // What the build needs is more than what remains of it.
-                Err(Error::LimitExceeded { .. }) => {
-                    fallback = Some("more triangles than the device can bind or dispatch while it builds")
-                }
-                Err(error) => return Err(error),
+        let begin = Instant::now();
+        match self.build_resident(gpu, triangles) {
+            Ok(Resident::Built(texels, traversal, stages, statistics)) => {
+                let report = IndexReport {
+                    kind: self.name(),
+                    build_ms: 1e3 * begin.elapsed().as_secs_f64(),
+                    stages,
+                    host_because: None,
+                    instead_because: None,
+                    kept: None,
+                    statistics,
+                };
+                return Ok(IndexOnDevice {
+                    texels,
+                    traversal,
+                    report,
+                });
             }
+            Ok(Resident::OfHosts) => {}
+            Ok(Resident::TooFew) => fallback = Some("fewer than two triangles that rays can meet"),
+            // What the build needs is more than what remains of it.
+            Err(Error::LimitExceeded { .. }) => {
+                fallback = Some("more triangles than the device can bind or dispatch while it builds")
+            }
+            Err(error) => return Err(error),
         }
         let (index, report) = self.build_timed(triangles, folder)?;
         let format = vk::Format::R32G32B32A32_UINT;
@@ -145,6 +144,21 @@ impl IndexKind {
             texels: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
             traversal: index.device_traversal(),
             report: IndexReport { host_because, ..report },
+        })
+    }
+
+    /// Builds on the device, where the kind says so.
+    fn build_resident(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<Resident> {
+        Ok(match self {
+            Self::LbvhOnDevice(settings) => match LbvhBuilder::new(gpu, settings)?.build_resident(triangles)? {
+                Some(built) => Resident::Built(built.quarters, DeviceTraversal::Bvh2, built.stages, built.statistics),
+                None => Resident::TooFew,
+            },
+            Self::WideOnDevice(settings) => match WideBuilder::new(gpu, settings)?.build_resident(triangles)? {
+                Some(built) => Resident::Built(built.texels, DeviceTraversal::Wide, built.stages, built.statistics),
+                None => Resident::TooFew,
+            },
+            _ => Resident::OfHosts,
         })
     }
 
@@ -179,6 +193,22 @@ impl IndexKind {
     }
 }
 
+/// What a device was asked to build.
+enum Resident {
+    Built(TexelView, DeviceTraversal, BuildStages, IndexStatistics),
+    TooFew,
+    /// The kind is built by the host.
+    OfHosts,
+}
+
+/// The settings of the tree that devices build.
+fn as_codes_spell_it(settings: &LbvhSettings) -> LbvhSettings {
+    LbvhSettings {
+        quality: BuildQuality::Fast,
+        ..*settings
+    }
+}
+
 impl fmt::Display for IndexKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
@@ -198,6 +228,7 @@ impl FromStr for IndexKind {
             Self::LbvhOnDevice(LbvhSettings::default()),
             Self::Kd(KdSettings::default()),
             Self::Wide(WideSettings::default()),
+            Self::WideOnDevice(WideSettings::default()),
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
@@ -282,7 +313,7 @@ mod tests {
             .collect();
         for (name, builder) in IndexKind::NAMES
             .into_iter()
-            .zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide"])
+            .zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide", "wide"])
         {
             let (index, report) = name
                 .parse::<IndexKind>()

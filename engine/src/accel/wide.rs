@@ -1,5 +1,5 @@
-//! Wide bounding volume hierarchy: eight children a node in 80 bytes, made of a binary tree, laid out for the kernels, and traversed by a twin of
-//! them.
+//! Wide bounding volume hierarchy: eight children a node in 80 bytes, made of a binary tree on the host or on the device, refitted there, laid out for
+//! the kernels, and traversed by a twin of them.
 //!
 //! Source: H. Ylitie, T. Karras and S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017: nodes with
 //! boxes of 8 bits a plane on a grid of their own (§4.1), the cheapest collapse of a binary tree by dynamic programming (§3.1), children in
@@ -325,26 +325,43 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-WIDE",
     name: "ray index: BVH of eight children a node, in 80 bytes",
     role: Role::Kernel,
-    limits: "Built on the host, from a binary tree, and never refitted; boxes are up to 1/127 of their node's size larger than what they hold.",
+    limits: "Boxes are up to 1/127 of their node's size larger than what they hold; refitting keeps the tree's shape, however things move; the device collapses the tree that codes spell, which is not optimised.",
     sources: &[sources::YLITIE_2017.whole()],
-    shaders: &["shaders/accel/wide.glsl"],
+    shaders: &[
+        "shaders/accel/wide.glsl",
+        "shaders/accel/wide_costs.comp",
+        "shaders/accel/wide_level.comp",
+        "shaders/accel/wide_collapse.comp",
+        "shaders/accel/wide_refit_triangles.comp",
+        "shaders/accel/wide_refit.comp",
+    ],
     tests: &[
         "engine/src/accel/wide/tests.rs::traversal_equals_trying_all_triangles_bit_for_bit",
         "engine/src/accel/wide/tests.rs::decoded_boxes_contain_what_they_are_made_of",
         "engine/src/accel/wide/tests.rs::spans_of_decoded_boxes_keep_their_stated_error",
         "engine/src/accel/wide/tests.rs::stopped_traversals_go_on_without_loss_or_repetition",
         "engine/src/accel/wide/tests.rs::no_other_collapse_costs_less",
+        "engine/src/accel/wide/tests.rs::refitted_trees_have_the_hits_of_all_triangles",
         "tests/tests/wide.rs::kernels_are_their_twins",
         "tests/tests/wide.rs::rays_that_a_quota_stops_go_on",
         "tests/tests/wide.rs::kernels_give_a_million_rays_the_hits_of_the_binary_tree",
+        "tests/tests/wide.rs::device_builds_are_the_twins",
+        "tests/tests/wide.rs::host_trees_are_collapsed_by_the_device_as_by_the_host",
+        "tests/tests/wide.rs::device_refits_are_the_twins",
         "tests/tests/hard_cases.rs::ray_indexes_answer_as_a_search_through_all_triangles",
         "tests/tests/index_choice.rs::pictures_are_the_same_to_the_bit_with_every_index",
     ],
     experiment: "clerestory index --peers",
-    api: &["clerestory::accel::wide::WideBvh"],
+    api: &[
+        "clerestory::accel::wide::WideBvh",
+        "clerestory::accel::wide::refit",
+        "clerestory::accel::wide::WideBuilder",
+        "clerestory::accel::wide::WideRefitter",
+    ],
     settings: &[
         "clerestory::accel::wide::WideSettings",
         "clerestory render --index wide",
+        "clerestory render --index wide-device",
     ],
     ..Row::of(file!())
 }];
