@@ -181,7 +181,7 @@ impl WideBvh {
     /// [`Error::Setting`] for a cost out of range and for a tree with leaves of more than [`LEAF_SIZE`] triangles.
     pub fn collapse(binary: &Bvh2, settings: &WideSettings) -> Result<Self> {
         check_triangle_cost(settings)?;
-        collapse::collapse(binary, settings.triangle_cost)
+        collapse::collapse(binary, settings.triangle_cost, SLOTS)
     }
 
     /// Nodes and triangles with the header before them, measured; of `statistics` the counts of triangles and the depth are given.
@@ -316,6 +316,9 @@ impl RayIndex for WideBvh {
         traversal.hit.is_hit()
     }
 }
+
+#[cfg(test)]
+mod estimates;
 
 #[cfg(test)]
 mod tests;

@@ -54,16 +54,19 @@ pub(super) struct Collapse<'a> {
     counts: Vec<u32>,
     costs: Vec<Costs>,
     triangle_cost: f32,
+    /// Slots of a node, at most [`SLOTS`].
+    width: usize,
 }
 
 impl<'a> Collapse<'a> {
     /// Of a tree of two triangles or more.
-    pub(super) fn of(nodes: &'a [Bvh2Node], triangle_cost: f32) -> Self {
+    pub(super) fn of(nodes: &'a [Bvh2Node], triangle_cost: f32, width: usize) -> Self {
         let mut collapse = Self {
             nodes,
             counts: vec![0; nodes.len()],
             costs: vec![[0.0; SLOTS - 1]; nodes.len()],
             triangle_cost,
+            width,
         };
         for index in parents_first(nodes).into_iter().rev() {
             let node = &nodes[index];
@@ -72,8 +75,8 @@ impl<'a> Collapse<'a> {
             let costs = both.map(|child| collapse.costs_of(&child));
             let area = half_area(&bounds_of(node));
             let own = &mut collapse.costs[index];
-            own[0] = (area + distribute(&costs, SLOTS).0).min(leaf_cost(area, count, triangle_cost));
-            for slots in 2..SLOTS {
+            own[0] = (area + distribute(&costs, width).0).min(leaf_cost(area, count, triangle_cost));
+            for slots in 2..width {
                 own[slots - 1] = own[slots - 2].min(distribute(&costs, slots).0);
             }
             collapse.counts[index] = count.min(LEAF_SIZE + 1);
@@ -99,13 +102,13 @@ impl<'a> Collapse<'a> {
     #[cfg(test)]
     pub(super) fn root_cost(&self) -> f32 {
         let costs = children(&self.nodes[0]).map(|child| self.costs_of(&child));
-        half_area(&bounds_of(&self.nodes[0])) + distribute(&costs, SLOTS).0
+        half_area(&bounds_of(&self.nodes[0])) + distribute(&costs, self.width).0
     }
 
     /// What the slots of a node hold, as they come from left to right.
     fn slots_of(&self, node: usize, found: &mut Vec<Subtree>) {
         found.clear();
-        self.split(node, SLOTS, found);
+        self.split(node, self.width, found);
     }
 
     /// A node's children in so many slots.
@@ -253,7 +256,8 @@ pub(super) fn check_leaves(binary: &Bvh2) -> Result<()> {
     }
 }
 
-pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
+/// The tree of nodes that have `width` slots at most.
+pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32, width: usize) -> Result<WideBvh> {
     check_leaves(binary)?;
     let mut watch = Stopwatch::start();
     let mut statistics = binary.statistics();
@@ -266,7 +270,7 @@ pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
     let [a, b] = binary.nodes()[0].bounds.map(Aabb::without_negative_zero);
     let mut bounds = a.union(b);
     if statistics.triangles >= 2 {
-        let tree = Collapse::of(binary.nodes(), triangle_cost);
+        let tree = Collapse::of(binary.nodes(), triangle_cost, width);
         statistics.max_depth = write(&tree, &mut writer);
     } else {
         // The binary tree has a sentinel beside one triangle or none.

@@ -311,7 +311,7 @@ fn no_other_collapse_costs_less() {
                 + least_cost(&binary, node.children[1], &node.bounds[1], SLOTS - left, &costs)
         });
         let least = 1.0 + ways.fold(f64::INFINITY, f64::min);
-        let tree = super::collapse::Collapse::of(binary.nodes(), triangle_cost);
+        let tree = super::collapse::Collapse::of(binary.nodes(), triangle_cost, SLOTS);
         let found = f64::from(tree.root_cost()) / root;
         assert!((found - least).abs() < 1e-5 * least, "{count}: {found} {least}");
         // What was written costs that, too.
