@@ -81,8 +81,12 @@ const BY_WHOLE_WORKGROUPS: &str = "the whole workgroup comes to it";
 /// By these votes lanes wait for each other, or go where another lane must go; what each lane finds is its own, whichever other lanes vote with it.
 const WITH_ANY_COMPANY: &str = "no result depends on who votes";
 
+/// Whole subgroups call the traversal, and every branch and loop of it depends on what the subgroup has agreed on alone: lanes never part.
+const BY_WHOLE_SUBGROUPS: &str = "the whole subgroup comes to it";
+
 /// Modules with subgroup operations, each with why its results do not depend on lanes coming together again where SPIR-V does not promise it.
 const WITH_SUBGROUP_OPERATIONS: &[(&str, &str)] = &[
+    ("accel/trace_packets.comp", BY_WHOLE_SUBGROUPS),
     ("accel/trace_queue_vote.comp", WITH_ANY_COMPANY),
     ("kernels/model_queue.comp", BY_WHOLE_WORKGROUPS),
     ("kernels/partition_subgroup.comp", BY_WHOLE_WORKGROUPS),

@@ -1,19 +1,18 @@
 //! Kernels that traverse wide hierarchies, for both queries, against their Rust twin: hits to the bit, and the work exactly; and against the
-//! binary hierarchy.
-//!
-//! Equality of bits with the twin is asked of software devices: Vulkan lets others divide with an error of 2.5 ULP, so there the hits are held to the
-//! f64 test.
+//! binary hierarchy. What the device builds and refits, against the host.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
-use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
-use clerestory::accel::wide::{LEAF_SIZE, WideBuilder, WideBvh, WideRefitter, WideSettings, WideTraversal, refit};
-use clerestory::accel::{FINISHED, Hit, Ray, RayIndex, TraversalCounters};
-use clerestory::gpu::{DeviceKind, Gpu};
-use clerestory::scene::{Instance, Scene};
+use clerestory::accel::trace::{Execution, PacketTracer, PersistentThreads, Query, RayTracer, TraceSettings};
+use clerestory::accel::wide::packet::trace_packet;
+use clerestory::accel::wide::{LEAF_SIZE, WideBuilder, WideBvh, WideRefitter, WideSettings, refit};
+use clerestory::accel::{Ray, RayIndex, TraversalCounters};
+use clerestory::gpu::ash::vk;
+use clerestory::gpu::{Category, DeviceKind};
 use clerestory_hard_cases::{hit_bits, misses, soup_with_rays};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::builtin;
+use clerestory_tests::traced::{Case, check};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
@@ -22,21 +21,12 @@ const QUOTA: u32 = 3000;
 /// Stops many.
 const SMALL_QUOTA: u32 = 40;
 
-struct Case {
-    what: String,
-    triangles: Vec<[Vec3; 3]>,
-    bvh: WideBvh,
-    rays: Vec<Ray>,
-}
-
-impl Case {
-    fn new(what: &str, triangles: Vec<[Vec3; 3]>, rays: Vec<Ray>) -> Self {
-        Self {
-            what: what.into(),
-            bvh: WideBvh::build(&triangles, &WideSettings::default()).unwrap(),
-            triangles,
-            rays,
-        }
+fn case(what: &str, triangles: Vec<[Vec3; 3]>, rays: Vec<Ray>) -> Case<WideBvh> {
+    Case {
+        what: what.into(),
+        index: WideBvh::build(&triangles, &WideSettings::default()).unwrap(),
+        triangles,
+        rays,
     }
 }
 
@@ -44,70 +34,16 @@ fn soup() -> (Vec<[Vec3; 3]>, Vec<Ray>) {
     soup_with_rays(51, 3000, 2048)
 }
 
-fn cases() -> Vec<Case> {
+fn cases() -> Vec<Case<WideBvh>> {
     let hard = clerestory_hard_cases::all();
     let sets = hard.iter().filter_map(|case| case.rays).flat_map(|rays| rays());
-    let mut cases: Vec<Case> = sets.map(|set| Case::new(&set.what, set.triangles, set.rays)).collect();
+    let mut cases: Vec<_> = sets.map(|set| case(&set.what, set.triangles, set.rays)).collect();
     let (triangles, rays) = soup();
     let few = rays[..40].to_vec();
-    cases.push(Case::new(
-        "one triangle",
-        vec![[Vec3::ZERO, Vec3::X, Vec3::Y]],
-        few.clone(),
-    ));
-    cases.push(Case::new("nothing", Vec::new(), few));
-    cases.push(Case::new("soup", triangles, rays));
+    cases.push(case("one triangle", vec![[Vec3::ZERO, Vec3::X, Vec3::Y]], few.clone()));
+    cases.push(case("nothing", Vec::new(), few));
+    cases.push(case("soup", triangles, rays));
     cases
-}
-
-/// Hits and work of the twin, and how often a ray was stopped.
-fn twin(case: &Case, settings: &TraceSettings) -> (Vec<Hit>, TraversalCounters, u64) {
-    let (mut counters, mut stops) = (TraversalCounters::default(), 0);
-    let trace = |ray: &Ray| {
-        let mut traversal = match settings.query {
-            Query::Closest => WideTraversal::closest(ray),
-            Query::Any => WideTraversal::any(ray),
-        };
-        let quota = u64::from(settings.ray_quota);
-        loop {
-            traversal.run(&case.bvh, ray, quota, &mut |_, _| true, &mut counters);
-            if traversal.resume == FINISHED {
-                return traversal.hit;
-            }
-            stops += 1;
-        }
-    };
-    let hits = case.rays.iter().map(trace).collect();
-    (hits, counters, stops)
-}
-
-/// Traces all cases with the same settings. How often rays were stopped.
-fn check(gpu: &Gpu, cases: &[Case], asked: &TraceSettings) -> u64 {
-    let exact = gpu.caps().kind == DeviceKind::Cpu;
-    // Kept, so that all share a pipeline.
-    let mut tracers = Vec::new();
-    let mut stopped = 0;
-    for case in cases {
-        let settings = &asked.fitted(gpu.caps(), case.bvh.device_traversal());
-        let what = format!("{}, {settings:?}", case.what);
-        let tracer = RayTracer::new(gpu, &case.bvh, settings).unwrap();
-        let traced = tracer.trace(&case.rays).unwrap();
-        tracers.push(tracer);
-        stopped += traced.unfinished;
-        let (hits, work, stops) = twin(case, settings);
-        for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
-            if exact {
-                assert_eq!(hit_bits(found), hit_bits(expected), "{what}: {ray:?}");
-            } else if settings.query == Query::Closest || !found.is_hit() {
-                assert!(!misses(&case.triangles, ray, found), "{what}: {ray:?}");
-            }
-        }
-        if exact {
-            assert_eq!(traced.work, work, "{what}");
-            assert_eq!(traced.unfinished, stops, "{what}");
-        }
-    }
-    stopped
 }
 
 fn settings(query: Query, ray_quota: u32) -> TraceSettings {
@@ -154,7 +90,7 @@ fn persistent_threads_trace_every_ray_once() {
             execution: Execution::Persistent(threads),
             ..settings(Query::Closest, QUOTA)
         };
-        check(gpu, &[Case::new("soup", triangles, rays)], &asked);
+        check(gpu, &[case("soup", triangles, rays)], &asked);
     });
 }
 
@@ -170,20 +106,6 @@ fn quotas_that_could_lose_rays_are_refused() {
         assert!(RayTracer::new(gpu, &bvh, &fitted).is_ok());
         assert!(!refused || fitted.ray_quota > 1000, "{fitted:?}");
     });
-}
-
-fn triangles_of(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let of_instance = |instance: &Instance| {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let place = |i: u32| {
-            instance
-                .transform
-                .transform_point3(mesh.positions[i as usize].as_dvec3())
-                .as_vec3()
-        };
-        mesh.triangles.iter().map(|t| t.map(place)).collect::<Vec<_>>()
-    };
-    scene.instances.iter().flat_map(of_instance).collect()
 }
 
 /// Rays of a scene: half from its camera's place to triangles, half from triangles in random directions.
@@ -216,7 +138,7 @@ fn kernels_give_a_million_rays_the_hits_of_the_binary_tree() {
             ("builtin:sphere-flake?depth=2&frequency=4", 300_000),
         ] {
             let scene = builtin(address);
-            let triangles = triangles_of(&scene);
+            let triangles = scene.triangles().map(|(triangle, _)| triangle).collect::<Vec<_>>();
             let eye = scene.cameras[0].transform.translation.as_vec3();
             let rays = rays_among(&triangles, eye, count, &mut random);
             let binary = Bvh2::build(&triangles, &Bvh2Settings::default()).unwrap();
@@ -414,5 +336,76 @@ fn device_refits_are_the_twins() {
                 assert!(refitter.refit(&there, &before, &triangles[1..]).is_err(), "{what}");
             }
         }
+    });
+}
+
+#[test]
+fn packets_are_their_twins_and_give_rays_their_hits() {
+    with_gpu(|gpu| {
+        let caps = gpu.caps();
+        let exact = caps.kind == DeviceKind::Cpu;
+        let mut cases = cases();
+        // Through neighbouring pixels, and as many as leave a subgroup with lanes that have none.
+        let scene = builtin("builtin:box-city?n=60");
+        let eye = scene.cameras[0].transform.translation.as_vec3();
+        let triangles: Vec<[Vec3; 3]> = scene.triangles().map(|(triangle, _)| triangle).collect();
+        let rays = (0..1003u16).map(|i| {
+            let (x, y) = (f32::from(i % 40) / 40.0 - 0.5, f32::from(i / 40) / 40.0 - 0.3);
+            let direction = scene.cameras[0]
+                .transform
+                .transform_vector3(Vec3::new(x, -y, -1.0).as_dvec3());
+            Ray::new(eye, direction.as_vec3())
+        });
+        cases.push(case("city", triangles, rays.collect()));
+        let mut tracers = Vec::new();
+        let (mut stopped, mut unstopped) = (0, 0);
+        for quota in [QUOTA, SMALL_QUOTA] {
+            for query in [Query::Closest, Query::Any] {
+                for case in &cases {
+                    let settings = settings(query, quota).fitted(caps, case.index.device_traversal());
+                    let what = format!("{}, {settings:?}", case.what);
+                    let format = vk::Format::R32G32B32A32_UINT;
+                    let texels = gpu
+                        .texels_with("wide", Category::Index, format, case.index.texels())
+                        .unwrap();
+                    let tracer = PacketTracer::new(gpu, texels, &settings).unwrap();
+                    let traced = tracer.trace(&case.rays).unwrap();
+                    tracers.push(tracer);
+                    let any = query == Query::Any;
+                    let (mut work, mut unfinished) = (TraversalCounters::default(), 0);
+                    let packets = case.rays.chunks(caps.subgroup_size as usize);
+                    let expected = packets.flat_map(|packet| {
+                        trace_packet(&case.index, packet, any, settings.ray_quota.into(), &mut work)
+                    });
+                    let expected: Vec<_> = expected.collect();
+                    for ((ray, found), (packet, is_done)) in case.rays.iter().zip(&traced.hits).zip(&expected) {
+                        let alone = case.index.closest_hit(ray);
+                        unfinished += u64::from(!is_done);
+                        if exact && any {
+                            assert_eq!(found.is_hit(), alone.is_hit(), "{what}: {ray:?}");
+                        }
+                        if exact && (*is_done || !any) {
+                            let expected = if any { packet } else { &alone };
+                            assert_eq!(hit_bits(found), hit_bits(expected), "{what}: {ray:?}");
+                        } else if !exact && (!any || !found.is_hit()) {
+                            assert!(!misses(&case.triangles, ray, found), "{what}: {ray:?}");
+                        }
+                        // A packet that was not stopped has found what its rays find by themselves.
+                        if *is_done && !any {
+                            assert_eq!(hit_bits(packet), hit_bits(&alone), "{what}: {ray:?}");
+                        }
+                    }
+                    if exact && unfinished == 0 {
+                        assert_eq!(traced.work, work, "{what}");
+                        assert_eq!(traced.unfinished, 0, "{what}");
+                        unstopped += 1;
+                    }
+                    stopped += unfinished;
+                    assert!(!exact || traced.unfinished >= unfinished, "{what}");
+                }
+            }
+        }
+        assert!(stopped > 1000, "{stopped} rays stopped");
+        assert!(!exact || unstopped > cases.len(), "{unstopped} cases went through");
     });
 }

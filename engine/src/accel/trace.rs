@@ -9,8 +9,10 @@
 //! since queues have quotas and what they leave is dispatched again; no workgroup waits for another. Which workgroup traces which ray
 //! differs from run to run, and shows in nothing but the time.
 
+mod packets;
 mod settings;
 
+pub use packets::PacketTracer;
 pub use settings::{Execution, PersistentThreads, Query, TraceSettings};
 
 use super::kd::KdCounters;
@@ -257,6 +259,11 @@ impl RayTracer {
     /// [`Error::Setting`] for more than [`MAX_RAYS`], [`Error::LimitExceeded`] when a buffer is larger than the device binds,
     /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
     pub fn trace(&self, rays: &[Ray]) -> Result<Traced> {
+        self.trace_with(rays, |traced, buffers| self.round(buffers, traced))
+    }
+
+    /// As [`RayTracer::trace`], with another first round.
+    fn trace_with(&self, rays: &[Ray], first: impl FnOnce(&mut Traced, &TraceBuffers) -> Result<()>) -> Result<Traced> {
         if rays.len() > MAX_RAYS {
             return Err(Error::setting("rays", rays.len(), format!("is above {MAX_RAYS}")));
         }
@@ -266,8 +273,8 @@ impl RayTracer {
         }
         let buffers = self.buffers(rays.len() as u32)?;
         self.gpu.upload(&buffers.rays, 0, rays)?;
+        first(&mut traced, &buffers)?;
         loop {
-            self.round(&buffers, &mut traced)?;
             traced.rounds += 1;
             let [status] = self.gpu.read::<TraceStatus>(buffers.status.view(), 1)?[..] else {
                 break;
@@ -293,6 +300,7 @@ impl RayTracer {
             if status.unfinished == 0 {
                 break;
             }
+            self.round(&buffers, &mut traced)?;
         }
         if let DeviceTraversal::Kd { .. } = self.traversal {
             traced.kd_work.nodes = traced.work.nodes;
@@ -509,6 +517,21 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
         ],
         api: &["clerestory::accel::trace::RayTracer"],
+        settings: &["clerestory::accel::trace::TraceSettings"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-PACKETS",
+        name: "closest hits of a buffer of rays in wide hierarchies: a subgroup's rays together, a texel fetched by each lane",
+        role: Role::Kernel,
+        limits: "For rays that go nearly the same way; what its quota stops begins anew, by itself. No technique uses it yet.",
+        sources: &[sources::YLITIE_2017.whole()],
+        shaders: &["shaders/accel/trace_packets.comp", "shaders/accel/wide_packet.glsl"],
+        tests: &[
+            "tests/tests/wide.rs::packets_are_their_twins_and_give_rays_their_hits",
+            "engine/src/accel/wide/estimates.rs::packets_visit_fewer_nodes_than_their_rays",
+        ],
+        api: &["clerestory::accel::trace::PacketTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
     },

@@ -16,6 +16,7 @@ mod device;
 mod device_refit;
 mod frame;
 mod grid;
+pub mod packet;
 mod refit;
 mod slots;
 pub mod traverse;

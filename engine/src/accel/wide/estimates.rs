@@ -3,11 +3,9 @@
 //! Software drivers pay for fetches, lane by lane, not for arithmetic: so a form wins where it fetches fewer texels a ray.
 
 use super::collapse::collapse;
-use super::traverse::{wide_grid, wide_span};
-use super::{MAX_DEPTH, SLOTS, WideBvh, WideSettings};
-use crate::accel::box_test::BoxTest;
-use crate::accel::triangle::{RayShear, intersect_triangle, ray_shear};
-use crate::accel::{Hit, Ray, RayIndex, TraversalCounters, lbvh};
+use super::packet::trace_packet;
+use super::{SLOTS, WideBvh, WideSettings};
+use crate::accel::{Ray, RayIndex, TraversalCounters, lbvh};
 use crate::gpu::shaders::constants;
 use crate::scene::{self, Projection, Scene};
 use glam::{DVec3, Vec3};
@@ -26,16 +24,6 @@ const PACKET: usize = 8;
 
 /// Texels of a node of four children: frame and words as in wide nodes, and six planes of four bytes each, behind one another.
 const TEXELS_OF_FOUR: u64 = 4;
-
-fn triangles_of(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let of_instance = |instance: &scene::Instance| {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let corner = |i: u32| mesh.positions[i as usize].as_dvec3();
-        let place = |i: u32| instance.transform.transform_point3(corner(i)).as_vec3();
-        mesh.triangles.iter().map(|t| t.map(place)).collect::<Vec<_>>()
-    };
-    scene.instances.iter().flat_map(of_instance).collect()
-}
 
 /// Rays through the pixels, row by row.
 fn camera_rays(scene: &Scene) -> Vec<Ray> {
@@ -82,67 +70,6 @@ fn count(bvh: &WideBvh, rays: &[Ray], any: bool) -> TraversalCounters {
     counters
 }
 
-/// Nodes and triangles that rays visit together: a node or a triangle is fetched once where any of them meets its box.
-fn count_packet(bvh: &WideBvh, rays: &[Ray], any: bool) -> TraversalCounters {
-    struct One {
-        boxes: BoxTest,
-        octant: u32,
-        shear: RayShear,
-        hit: Hit,
-    }
-    let bounds = bvh.bounds();
-    let mut ones: Vec<One> = rays
-        .iter()
-        .map(|ray| {
-            let boxes = BoxTest::new(&bounds, ray);
-            One {
-                boxes,
-                octant: (0..3).fold(0, |octant, axis| octant | u32::from(boxes.inverse[axis] < 0.0) << axis),
-                shear: ray_shear(Vec3::from(ray.origin), Vec3::from(ray.direction)),
-                hit: Hit::none(ray.t_max),
-            }
-        })
-        .collect();
-    let mut counters = TraversalCounters::default();
-    let mut stack = Vec::with_capacity(SLOTS * MAX_DEPTH as usize);
-    stack.push(0u32);
-    while let Some(place) = stack.pop() {
-        if any && ones.iter().all(|one| one.hit.is_hit()) {
-            break;
-        }
-        counters.nodes += 1;
-        let node = &bvh.nodes()[place as usize];
-        let mut met = 0u32;
-        for (one, ray) in ones.iter().zip(rays).filter(|(one, _)| !any || !one.hit.is_hit()) {
-            let grid = wide_grid(&one.boxes, node);
-            for slot in 0..SLOTS {
-                let (near, far) = wide_span(&grid, node, one.octant, slot);
-                met |= u32::from(near.max(ray.t_min) <= far.min(one.hit.t)) << slot;
-            }
-        }
-        for slot in (0..SLOTS).filter(|slot| met >> slot & 1 != 0) {
-            let (first, held) = node.leaf(slot);
-            for triangle in &bvh.triangles()[first as usize..][..held as usize] {
-                counters.triangles += 1;
-                for (one, ray) in ones.iter_mut().zip(rays) {
-                    if let Some(found) = intersect_triangle(&one.shear, &triangle.corners, ray.t_min, one.hit.t) {
-                        (one.hit.t, one.hit.triangle) = (found.t, triangle.index);
-                    }
-                }
-            }
-        }
-        // The first ray's order.
-        let octant = ones[0].octant as usize;
-        let slots = (0..SLOTS).rev().map(|place| place ^ octant);
-        stack.extend(
-            slots
-                .filter(|slot| met >> slot & 1 != 0)
-                .filter_map(|slot| node.child(slot)),
-        );
-    }
-    counters
-}
-
 /// Texels of nodes and of triangles.
 fn texels(counters: TraversalCounters, of_node: u64) -> u64 {
     of_node * counters.nodes + u64::from(constants::WIDE_TRIANGLE_TEXELS) * counters.triangles
@@ -153,7 +80,8 @@ fn each_scene(mut see: impl FnMut(&str, &[WideBvh; 2], &str, &[Ray], bool)) {
     let settings = WideSettings::default();
     for address in SCENES {
         let scene = scene::load(address).expect("builtin");
-        let binary = lbvh::build(&triangles_of(&scene), &settings.binary).expect("valid");
+        let triangles: Vec<_> = scene.triangles().map(|(triangle, _)| triangle).collect();
+        let binary = lbvh::build(&triangles, &settings.binary).expect("valid");
         let trees = [SLOTS, 4].map(|width| collapse(&binary, settings.triangle_cost, width).expect("valid"));
         let rays = camera_rays(&scene);
         see(address, &trees, "camera", &rays, false);
@@ -188,13 +116,17 @@ fn packets_visit_fewer_nodes_than_their_rays() {
     each_scene(|address, [bvh, _], kind, rays, any| {
         let alone = count(bvh, rays, any);
         let mut together = TraversalCounters::default();
+        // Visits of the ray of most, which is how long a subgroup takes whose lanes go their own ways side by side.
+        let mut longest = 0;
         for packet in rays.chunks(PACKET) {
-            let counters = count_packet(bvh, packet, any);
-            together.nodes += counters.nodes;
-            together.triangles += counters.triangles;
+            trace_packet(bvh, packet, any, u64::MAX, &mut together);
+            let of_each = packet
+                .iter()
+                .map(|ray| count(bvh, std::slice::from_ref(ray), any).nodes);
+            longest += of_each.max().unwrap_or_default();
         }
         println!(
-            "{address}, {kind}: nodes {} of {} (1/{:.2}), triangles {} of {}",
+            "{address}, {kind}: nodes {} of {} (1/{:.2}), of the longest rays {longest}, triangles {} of {}",
             together.nodes,
             alone.nodes,
             alone.nodes as f64 / together.nodes as f64,
