@@ -1,5 +1,8 @@
 // Traversal of the wide hierarchy by the rays of a subgroup together, for rays that go nearly the same way; twin of
-// clerestory::accel::wide::WidePacket.
+// clerestory::accel::wide::packet.
+//
+// Source: J. Günther, S. Popov, H.-P. Seidel and P. Slusallek, "Realtime Ray Tracing on GPU with BVH-based Packet Traversal", IEEE RT 2007 (one stack for a
+// packet of a subgroup).
 //
 // All lanes visit the same nodes, those whose box any of their rays meets, in the order of the first ray; and each lane fetches another texel of a node or of
 // a triangle and hands it to the others. So a node costs a fetch of the subgroup, not five. Hits are those of each ray alone: more triangles

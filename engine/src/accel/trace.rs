@@ -525,7 +525,7 @@ pub(crate) const ROWS: &[Row] = &[
         name: "closest hits of a buffer of rays in wide hierarchies: a subgroup's rays together, a texel fetched by each lane",
         role: Role::Kernel,
         limits: "For rays that go nearly the same way; what its quota stops begins anew, by itself. No technique uses it yet.",
-        sources: &[sources::YLITIE_2017.whole()],
+        sources: &[sources::GUENTHER_2007.whole(), sources::YLITIE_2017.whole()],
         shaders: &["shaders/accel/trace_packets.comp", "shaders/accel/wide_packet.glsl"],
         tests: &[
             "tests/tests/wide.rs::packets_are_their_twins_and_give_rays_their_hits",

@@ -1,5 +1,7 @@
 //! Twin of the kernels' traversal by packets: rays that go nearly the same way visit the nodes that any of them meets, in the order of the first ray.
 //!
+//! Source: J. Günther, S. Popov, H.-P. Seidel and P. Slusallek, "Realtime Ray Tracing on GPU with BVH-based Packet Traversal", IEEE RT 2007.
+//!
 //! A node and a triangle are fetched once for all. Hits are those of each ray alone, since a packet tests what each of its rays would test and more, and the
 //! least candidate is the same; of a query for any hit it may be another one of the ray's hits.
 

@@ -45,6 +45,7 @@ sources! {
     GERASIMOV_2004 = "gerasimov-2004": "P. Gerasimov", "Omnidirectional Shadow Mapping", "GPU Gems", 2004;
     GORAL_1984 = "goral-1984": "C. Goral, K. Torrance, D. Greenberg, B. Battaile", "Modeling the Interaction of Light Between Diffuse Surfaces", "SIGGRAPH", 1984;
     GREENE_1986 = "greene-1986": "N. Greene", "Environment Mapping and Other Applications of World Projections", "IEEE CG&A 6(11)", 1986;
+    GUENTHER_2007 = "guenther-2007": "J. Günther, S. Popov, H.-P. Seidel, P. Slusallek", "Realtime Ray Tracing on GPU with BVH-based Packet Traversal", "IEEE RT", 2007;
     HACHISUKA_JENSEN_2009 = "hachisuka-jensen-2009": "T. Hachisuka, H. W. Jensen", "Stochastic Progressive Photon Mapping", "ACM TOG 28(5)", 2009;
     HAINES_1987 = "haines-1987": "E. Haines", "A Proposal for Standard Graphics Environments", "IEEE CG&A 7(11)", 1987;
     HAINES_2019 = "haines-2019": "E. Haines et al.", "Precision Improvements for Ray/Sphere Intersection", "Ray Tracing Gems, chapter 7", 2019;
