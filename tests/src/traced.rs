@@ -13,9 +13,13 @@ use glam::Vec3;
 
 /// An index and rays in it.
 pub struct Case<I> {
+    /// Name in messages.
     pub what: String,
+    /// Corners, metres.
     pub triangles: Vec<[Vec3; 3]>,
+    /// An index over them.
     pub index: I,
+    /// What is traced.
     pub rays: Vec<Ray>,
 }
 

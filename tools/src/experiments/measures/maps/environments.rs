@@ -5,8 +5,6 @@ use clerestory::accel::{NO_HIT, Ray, RayIndex};
 use clerestory::{Result, scene};
 use glam::{DVec3, Vec3};
 
-use crate::geometry;
-
 /// A function over the sphere.
 pub struct Environment {
     /// Its name.
