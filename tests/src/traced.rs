@@ -80,10 +80,38 @@ impl StoppableIndex for KdTree {
     }
 }
 
+/// Holds hits that kernels have found to those of the twin, whose work and stops it returns.
+pub fn check_hits<I: StoppableIndex>(
+    gpu: &Gpu,
+    case: &Case<I>,
+    settings: &TraceSettings,
+    hits: &[Hit],
+) -> (I::Work, u64) {
+    let exact = gpu.caps().kind == DeviceKind::Cpu;
+    let (mut work, mut stops) = (I::Work::default(), 0);
+    for (ray, found) in case.rays.iter().zip(hits) {
+        let expected = case.index.trace(ray, settings, &mut work, &mut stops);
+        if exact {
+            assert_eq!(
+                hit_bits(found),
+                hit_bits(&expected),
+                "{}, {settings:?}: {ray:?}",
+                case.what
+            );
+        } else if settings.query == Query::Closest || !found.is_hit() {
+            assert!(
+                !misses(&case.triangles, ray, found),
+                "{}, {settings:?}: {ray:?}",
+                case.what
+            );
+        }
+    }
+    (work, stops)
+}
+
 /// Traces all cases with the same settings, or with as much of their quota as fits a software device's loops: the wider its subgroups, the less. How often
 /// rays were stopped by the quota that was asked for.
 pub fn check<I: StoppableIndex>(gpu: &Gpu, cases: &[Case<I>], asked: &TraceSettings) -> u64 {
-    let exact = gpu.caps().kind == DeviceKind::Cpu;
     // Kept, so that all share a pipeline.
     let mut tracers = Vec::new();
     let mut stopped = 0;
@@ -96,16 +124,8 @@ pub fn check<I: StoppableIndex>(gpu: &Gpu, cases: &[Case<I>], asked: &TraceSetti
         if settings.ray_quota == asked.ray_quota {
             stopped += traced.unfinished;
         }
-        let (mut work, mut stops) = (I::Work::default(), 0);
-        for (ray, found) in case.rays.iter().zip(&traced.hits) {
-            let expected = case.index.trace(ray, settings, &mut work, &mut stops);
-            if exact {
-                assert_eq!(hit_bits(found), hit_bits(&expected), "{what}: {ray:?}");
-            } else if settings.query == Query::Closest || !found.is_hit() {
-                assert!(!misses(&case.triangles, ray, found), "{what}: {ray:?}");
-            }
-        }
-        if exact {
+        let (work, stops) = check_hits(gpu, case, settings, &traced.hits);
+        if gpu.caps().kind == DeviceKind::Cpu {
             assert_eq!(I::work_of(&traced), work, "{what}");
             assert_eq!(traced.unfinished, stops, "{what}");
         }

@@ -1,16 +1,16 @@
 //! Kernels that traverse kd-trees, by every scheme and for both queries, against their Rust twin: hits to the bit, and the work exactly.
 
 use clerestory::Error;
-use clerestory::accel::kd::{KdCaches, KdCounters, KdNode, KdSettings, KdTraversal, KdTree, MAX_BYTE_LEVELS, Scheme};
+use clerestory::accel::kd::{KdCaches, KdNode, KdSettings, KdTree, MAX_BYTE_LEVELS, Scheme};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
-use clerestory::accel::{FINISHED, Hit, Ray, RayIndex};
+use clerestory::accel::{Ray, RayIndex};
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::constants::{KD_HEAP_LEVELS, KD_LEAF, KD_STACK_CACHE_BYTES, KD_STACK_CACHE_NONE};
 use clerestory::gpu::{Category, DeviceKind, Gpu};
-use clerestory_hard_cases::{hit_bits, misses, soup_with_rays};
+use clerestory_hard_cases::soup_with_rays;
 use clerestory_tests::shaders::kd_cache_probe;
 use clerestory_tests::shaders::sets::IndexSet;
-use clerestory_tests::traced::{Case, check};
+use clerestory_tests::traced::{Case, check, check_hits};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
@@ -339,7 +339,6 @@ fn rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none() {
 #[test]
 fn votes_change_no_hit() {
     with_gpu(|gpu| {
-        let exact = gpu.caps().kind == DeviceKind::Cpu;
         let cases = cases();
         let threads = PersistentThreads {
             groups: 3,
@@ -372,19 +371,7 @@ fn votes_change_no_hit() {
                 tracers.push(tracer);
                 stopped += traced.unfinished;
                 // Of a subgroup of one ray; its work is not that of the device's.
-                let (hits, ..) = twin(case, &settings);
-                for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
-                    if exact {
-                        assert_eq!(
-                            hit_bits(found),
-                            hit_bits(expected),
-                            "{}, {settings:?}: {ray:?}",
-                            case.what
-                        );
-                    } else if query == Query::Closest || !found.is_hit() {
-                        assert!(!misses(&case.triangles, ray, found), "{}: {ray:?}", case.what);
-                    }
-                }
+                check_hits(gpu, case, &settings, &traced.hits);
             }
         }
         assert!(!gpu.caps().subgroup.vote || stopped > 1000, "{stopped} stops");

@@ -266,10 +266,8 @@ fn one_scene(
         return Err(Error::setting("scene", address, "is met by no ray of its camera"));
     }
     let (tested, peer_rays) = (crates::peer_triangles(triangles), crates::peer_rays(&rays));
-    let mut contenders = Vec::new();
-    for one in &built {
-        contenders.push(ours::contender(gpu, one, &rays)?);
-    }
+    let mut contenders = ours::contenders(gpu, &built, &rays)?;
+    let of_ours = contenders.len();
     contenders.extend(crates::of_obvhs(&tested, &peer_rays, repeat)?);
     contenders.push(crates::of_bvh(triangles, &tested, &rays, &peer_rays, repeat)?);
     if let Some(embree) = embree {
@@ -290,7 +288,7 @@ fn one_scene(
         found.indexes.push(Measured {
             scene: address.to_owned(),
             index: contender.name.clone(),
-            is_ours: i < built.len(),
+            is_ours: i < of_ours,
             triangles: triangles.len(),
             build: contender.build,
             sah_cost: contender.sah_cost,

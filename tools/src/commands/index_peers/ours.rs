@@ -2,7 +2,7 @@
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
-use clerestory::accel::trace::TraceSettings;
+use clerestory::accel::trace::{PacketTracer, TraceSettings};
 use clerestory::accel::wide::{LEAF_SIZE, WideBvh, WideSettings};
 use clerestory::accel::{Hit, Ray, RayIndex};
 use clerestory::gpu::ash::vk::Format;
@@ -177,22 +177,75 @@ impl<'a> Kernel<'a> {
     pub fn met(&self, set: usize) -> Result<Vec<Intersection>> {
         let buffers = &self.sets[set];
         let hits = self.gpu.read::<Hit>(buffers.hits.view(), buffers.count as usize)?;
-        let met = |hit: &Hit| {
-            if hit.is_hit() {
-                Intersection {
-                    t: hit.t,
-                    triangle: hit.triangle,
-                }
-            } else {
-                Intersection::NONE
-            }
-        };
-        Ok(hits.iter().map(met).collect())
+        Ok(intersections(&hits))
     }
 }
 
-/// An index of ours that traces both kinds of rays.
-pub fn contender<'a>(gpu: &'a Gpu, built: &Built, rays: &[Vec<Ray>; 2]) -> Result<Contender<'a>> {
+/// Rays of several sets on the device, traced by packets of a subgroup.
+fn by_packets<'a>(gpu: &'a Gpu, built: &Built, rays: &[Vec<Ray>; 2]) -> Result<Contender<'a>> {
+    let index = built.index.index();
+    let settings = TraceSettings::ray_per_thread().fitted(gpu.caps(), index.device_traversal());
+    let texels = gpu.texels_with(index.name(), Category::Index, Format::R32G32B32A32_UINT, index.texels())?;
+    let tracer = PacketTracer::new(gpu, texels, &settings)?;
+    let mut sets = Vec::new();
+    for rays in rays {
+        let buffers = tracer.alone().buffers(rays.len() as u32)?;
+        gpu.upload(&buffers.rays, 0, rays)?;
+        sets.push((buffers, rays.len()));
+    }
+    Ok(Contender {
+        name: format!("{}, packets", built.name),
+        build: built.build,
+        sah_cost: Some(index.statistics().sah_cost),
+        trace: Box::new(move |kind| {
+            let (buffers, count) = &sets[kind];
+            let mut recorder = gpu.recorder("trace packets")?;
+            tracer.record(&mut recorder, buffers)?;
+            let (waited, mut seconds) = timed(|| recorder.submit()?.wait());
+            waited?;
+            while tracer.alone().unfinished(buffers)? > 0 {
+                let mut recorder = gpu.recorder("trace")?;
+                tracer.alone().record_on(&mut recorder, buffers)?;
+                let (waited, more) = timed(|| recorder.submit()?.wait());
+                waited?;
+                seconds += more;
+            }
+            Ok((seconds, intersections(&gpu.read::<Hit>(buffers.hits.view(), *count)?)))
+        }),
+    })
+}
+
+fn intersections(hits: &[Hit]) -> Vec<Intersection> {
+    let met = |hit: &Hit| {
+        if hit.is_hit() {
+            Intersection {
+                t: hit.t,
+                triangle: hit.triangle,
+            }
+        } else {
+            Intersection::NONE
+        }
+    };
+    hits.iter().map(met).collect()
+}
+
+/// An index of ours that traces both kinds of rays; the last one by packets too, where the device can.
+pub fn contenders<'a>(gpu: &'a Gpu, built: &[Built], rays: &[Vec<Ray>; 2]) -> Result<Vec<Contender<'a>>> {
+    let mut all = built
+        .iter()
+        .map(|one| contender(gpu, one, rays))
+        .collect::<Result<Vec<_>>>()?;
+    if let Some(last) = built.last() {
+        match by_packets(gpu, last, rays) {
+            Ok(packets) => all.push(packets),
+            Err(Error::MissingFeature { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(all)
+}
+
+fn contender<'a>(gpu: &'a Gpu, built: &Built, rays: &[Vec<Ray>; 2]) -> Result<Contender<'a>> {
     let kernel = Kernel::new(gpu, built.index.index(), &[&rays[0], &rays[1]])?;
     Ok(Contender {
         name: built.name.into(),
