@@ -524,13 +524,14 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-PACKETS",
         name: "closest hits of a buffer of rays in wide hierarchies: a subgroup's rays together, a texel fetched by each lane",
         role: Role::Kernel,
-        limits: "For rays that go nearly the same way; what its quota stops begins anew, by itself. No technique uses it yet.",
+        limits: "For rays that go nearly the same way; what its quota stops begins anew, by itself; no technique uses it yet.",
         sources: &[sources::GUENTHER_2007.whole(), sources::YLITIE_2017.whole()],
         shaders: &["shaders/accel/trace_packets.comp", "shaders/accel/wide_packet.glsl"],
         tests: &[
             "tests/tests/wide.rs::packets_are_their_twins_and_give_rays_their_hits",
             "engine/src/accel/wide/estimates.rs::packets_visit_fewer_nodes_than_their_rays",
         ],
+        experiment: "clerestory index --peers",
         api: &["clerestory::accel::trace::PacketTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
         ..Row::of(file!())
