@@ -175,7 +175,7 @@ fn meshes() -> Vec<Mesh> {
     ]
 }
 
-fn kinds() -> [IndexKind; 6] {
+fn kinds() -> [IndexKind; 7] {
     IndexKind::NAMES.map(|name| name.parse().unwrap())
 }
 

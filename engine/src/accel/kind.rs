@@ -11,6 +11,7 @@ use std::time::Instant;
 use super::bvh2::{Bvh2, Bvh2Settings};
 use super::kd::{KdSettings, KdTree};
 use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
+use super::two_level::{MeshGeometry, Placement, TwoLevelBvh};
 use super::wide::{WideBvh, WideSettings};
 use super::{BuildStages, DeviceTraversal, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
@@ -18,9 +19,9 @@ use crate::gpu::{Category, Gpu, TexelView};
 use crate::{Error, Result};
 use glam::Vec3;
 
-/// A ray index that the path tracer can traverse, with the settings of its build. The wide hierarchy by default, whose rays are the fastest.
+/// A ray index that the path tracer can traverse, with the settings of its build.
 ///
-/// As text, by [`FromStr`] and [`Display`](fmt::Display), it is one of [`IndexKind::NAMES`] with default settings.
+/// As text, by [`FromStr`] and [`Display`](fmt::Display), it is one of [`IndexKind::NAMES`] or [`IndexKind::AUTOMATIC`], with default settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IndexKind {
     /// Binary hierarchy by the binned surface area heuristic.
@@ -34,18 +35,26 @@ pub enum IndexKind {
     Kd(KdSettings),
     /// Eight children a node, compressed, made of the optimised linear hierarchy.
     Wide(WideSettings),
+    /// The same for each mesh, and one over the instances that place them: a scene is kept as it is described, where the others flatten it.
+    TwoLevel(WideSettings),
+    /// One of both: two levels where a scene needs much less memory with them or would not fit without, and the wide hierarchy elsewhere, whose rays are
+    /// faster ([`GpuScene::with_index`](crate::transport::GpuScene::with_index) has the rule). The default.
+    Automatic(WideSettings),
 }
 
 impl Default for IndexKind {
     fn default() -> Self {
-        Self::Wide(WideSettings::default())
+        Self::Automatic(WideSettings::default())
     }
 }
 
 impl IndexKind {
-    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
-    /// the device, the kd-tree, and the wide hierarchy.
-    pub const NAMES: [&'static str; 6] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide"];
+    /// The names of all that can be built: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
+    /// the device, the kd-tree, the wide hierarchy, and two levels of it.
+    pub const NAMES: [&'static str; 7] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide", "two-level"];
+
+    /// The name of the choice between the last two.
+    pub const AUTOMATIC: &'static str = "auto";
 
     /// The linear hierarchy with default settings.
     pub fn lbvh(quality: BuildQuality) -> Self {
@@ -55,7 +64,7 @@ impl IndexKind {
         })
     }
 
-    /// One of [`IndexKind::NAMES`].
+    /// One of [`IndexKind::NAMES`], or [`IndexKind::AUTOMATIC`].
     pub fn name(&self) -> &'static str {
         match self {
             Self::Bvh2(_) => "bvh2",
@@ -66,6 +75,8 @@ impl IndexKind {
             Self::LbvhOnDevice(_) => "lbvh-device",
             Self::Kd(_) => "kd",
             Self::Wide(_) => "wide",
+            Self::TwoLevel(_) => "two-level",
+            Self::Automatic(_) => Self::AUTOMATIC,
         }
     }
 
@@ -73,7 +84,7 @@ impl IndexKind {
     /// place in it. Deterministic whatever the number of threads.
     ///
     /// # Errors
-    /// As [`Bvh2::build`], [`lbvh::build`], [`KdTree::build`] and [`WideBvh::build`].
+    /// As [`Bvh2::build`], [`lbvh::build`], [`KdTree::build`], [`WideBvh::build`] and [`TwoLevelBvh::build`].
     pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<Box<dyn RayIndex>> {
         Ok(match self {
             Self::Bvh2(settings) => Box::new(Bvh2::build(triangles, settings)?),
@@ -86,7 +97,12 @@ impl IndexKind {
                 Box::new(lbvh::build(triangles, &settings)?)
             }
             Self::Kd(settings) => Box::new(KdTree::build(triangles, settings)?),
-            Self::Wide(settings) => Box::new(WideBvh::build(triangles, settings)?),
+            // Triangles alone have no instances.
+            Self::Wide(settings) | Self::Automatic(settings) => Box::new(WideBvh::build(triangles, settings)?),
+            Self::TwoLevel(settings) => {
+                let mesh = MeshGeometry { triangles, names: None };
+                Box::new(TwoLevelBvh::build(&[mesh], &[Placement::identity(0)], settings)?)
+            }
         })
     }
 
@@ -167,7 +183,10 @@ impl IndexKind {
             _ => (self.build(triangles)?, None),
         };
         let report = IndexReport {
-            kind: self.name(),
+            kind: match self {
+                Self::Automatic(_) => index.name(),
+                _ => self.name(),
+            },
             build_ms: 1e3 * begin.elapsed().as_secs_f64(),
             stages: index.stages(),
             host_because: None,
@@ -198,12 +217,14 @@ impl FromStr for IndexKind {
             Self::LbvhOnDevice(LbvhSettings::default()),
             Self::Kd(KdSettings::default()),
             Self::Wide(WideSettings::default()),
+            Self::TwoLevel(WideSettings::default()),
+            Self::Automatic(WideSettings::default()),
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
         .ok_or_else(|| {
             let known = Self::NAMES.join(", ");
-            Error::setting("index", name, format!("is not known; there is: {known}"))
+            Error::setting("index", name, format!("is not known; there is: {known}, {}", Self::AUTOMATIC))
         })
     }
 }
@@ -265,7 +286,7 @@ mod tests {
         for name in IndexKind::NAMES {
             assert_eq!(name.parse::<IndexKind>().unwrap().to_string(), name);
         }
-        assert!(IndexKind::NAMES.contains(&IndexKind::default().name()));
+        assert_eq!(IndexKind::AUTOMATIC.parse::<IndexKind>().unwrap(), IndexKind::default());
         for unknown in ["", "BVH2", "lbvh-fast", "bvh2 "] {
             let message = unknown.parse::<IndexKind>().unwrap_err().to_string();
             assert!(message.contains("bvh2, lbvh, lbvh-high"), "{message}");
@@ -282,7 +303,7 @@ mod tests {
             .collect();
         for (name, builder) in IndexKind::NAMES
             .into_iter()
-            .zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide"])
+            .zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide", "two-level"])
         {
             let (index, report) = name
                 .parse::<IndexKind>()

@@ -122,7 +122,7 @@ fn index_for(
         Ok(_) => Ok(asked),
         Err(Error::LimitExceeded { .. }) => {
             let because = match asked.traversal {
-                DeviceTraversal::Wide => "a round of its rays is longer than the loops of a software device",
+                DeviceTraversal::Wide | DeviceTraversal::TwoLevel => "a round of its rays is longer than the loops of a software device",
                 _ => "a leaf of the kd-tree is longer than the loops of a software device",
             };
             drop(asked);
@@ -242,7 +242,8 @@ impl GpuScene {
                 DeviceTraversal::Bvh2 => texels.min(quota.into()),
                 // A round's further iterations beside a node's five texels and a triangle's three.
                 DeviceTraversal::Wide => (2 * texels).min(quota.into()),
-                DeviceTraversal::Kd { .. } => quota.into(),
+                // A mesh is met once an instance.
+                DeviceTraversal::Kd { .. } | DeviceTraversal::TwoLevel => quota.into(),
             },
         })
     }
