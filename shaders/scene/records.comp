@@ -16,13 +16,15 @@ layout(set = 0, binding = 0, scalar) restrict writeonly buffer SceneRecords {
     SceneLight light;
     SceneEnvironment environment;
     SceneMedium medium;
+    SceneInstance instance;
 } records;
 
 void main() {
-    records.triangle = load_triangle(0u);
+    records.triangle = stored_triangle(0u);
     records.material = load_material(0u);
     records.texture_record = load_texture(0u);
     records.light = load_light(0u);
     records.environment = load_environment();
     records.medium = load_medium(0u);
+    records.instance = load_instance(0u);
 }

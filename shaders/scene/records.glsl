@@ -26,6 +26,7 @@ const uint TEXTURE_QUARTERS = 3u;
 const uint LIGHT_QUARTERS = 4u;
 const uint ENVIRONMENT_HEADER_QUARTERS = 3u;
 const uint MEDIUM_QUARTERS = 9u;
+const uint INSTANCE_QUARTERS = 4u;
 
 const uint PHASE_ISOTROPIC = 0u;
 const uint PHASE_HENYEY_GREENSTEIN = 1u;
@@ -39,6 +40,18 @@ struct SceneTriangle {
     uint light;  // index of its light, or NO_LIGHT
     vec3 c;
     uint around;  // of a body: material of the body that it is inside of, plus one; 0 without
+};
+
+// A mesh in a place, or meshes that are where they are and follow each other.
+struct SceneInstance {
+    vec3 row_x;       // rows of what takes it to world space
+    uint first;       // number of its first triangle
+    vec3 row_y;
+    uint record;      // where that is stored
+    vec3 row_z;
+    uint flags;       // INSTANCE_*
+    vec3 translation;
+    float spare;
 };
 
 struct SceneMaterial {

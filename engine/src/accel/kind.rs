@@ -155,13 +155,8 @@ impl IndexKind {
             }
         }
         let (index, report) = self.build_timed(triangles, folder)?;
-        let format = vk::Format::R32G32B32A32_UINT;
         let host_because = fallback;
-        Ok(IndexOnDevice {
-            texels: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
-            traversal: index.device_traversal(),
-            report: IndexReport { host_because, ..report },
-        })
+        IndexOnDevice::of(gpu, index.as_ref(), IndexReport { host_because, ..report })
     }
 
     /// Builds on the host, or reads what was kept, and says how long that took.
@@ -182,17 +177,14 @@ impl IndexKind {
             }
             _ => (self.build(triangles)?, None),
         };
+        let kind = match self {
+            Self::Automatic(_) => index.name(),
+            _ => self.name(),
+        };
+        let build_ms = 1e3 * begin.elapsed().as_secs_f64();
         let report = IndexReport {
-            kind: match self {
-                Self::Automatic(_) => index.name(),
-                _ => self.name(),
-            },
-            build_ms: 1e3 * begin.elapsed().as_secs_f64(),
-            stages: index.stages(),
-            host_because: None,
-            instead_because: None,
             kept,
-            statistics: index.statistics(),
+            ..IndexReport::of(kind, build_ms, index.as_ref())
         };
         Ok((index, report))
     }
@@ -224,7 +216,11 @@ impl FromStr for IndexKind {
         .find(|kind| kind.name() == name)
         .ok_or_else(|| {
             let known = Self::NAMES.join(", ");
-            Error::setting("index", name, format!("is not known; there is: {known}, {}", Self::AUTOMATIC))
+            Error::setting(
+                "index",
+                name,
+                format!("is not known; there is: {known}, {}", Self::AUTOMATIC),
+            )
         })
     }
 }
@@ -277,6 +273,33 @@ pub struct IndexReport {
     pub statistics: IndexStatistics,
 }
 
+impl IndexOnDevice {
+    /// Uploads an index that the host has built.
+    pub(crate) fn of(gpu: &Gpu, index: &dyn RayIndex, report: IndexReport) -> Result<Self> {
+        let format = vk::Format::R32G32B32A32_UINT;
+        Ok(Self {
+            texels: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
+            traversal: index.device_traversal(),
+            report,
+        })
+    }
+}
+
+impl IndexReport {
+    /// Of an index that the host has built as it was asked for.
+    pub(crate) fn of(kind: &'static str, build_ms: f64, index: &dyn RayIndex) -> Self {
+        Self {
+            kind,
+            build_ms,
+            stages: index.stages(),
+            host_because: None,
+            instead_because: None,
+            kept: None,
+            statistics: index.statistics(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -301,9 +324,10 @@ mod tests {
                 [corner, corner + Vec3::X, corner + Vec3::Y]
             })
             .collect();
-        for (name, builder) in IndexKind::NAMES
-            .into_iter()
-            .zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide", "two-level"])
+        for (name, builder) in
+            IndexKind::NAMES
+                .into_iter()
+                .zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide", "two-level"])
         {
             let (index, report) = name
                 .parse::<IndexKind>()

@@ -172,8 +172,15 @@ pub struct TwoLevelBvh {
 fn parts_of(tree: &[WideNode]) -> Vec<[DVec3; 2]> {
     let root = &tree[0];
     let held = |slot: &usize| root.child(*slot).is_some() || root.leaf(*slot).1 > 0;
-    let parts: Vec<_> = (0..super::wide::SLOTS).filter(held).map(|slot| root.bounds(slot)).collect();
-    if parts.is_empty() { vec![[DVec3::ZERO; 2]] } else { parts }
+    let parts: Vec<_> = (0..super::wide::SLOTS)
+        .filter(held)
+        .map(|slot| root.bounds(slot))
+        .collect();
+    if parts.is_empty() {
+        vec![[DVec3::ZERO; 2]]
+    } else {
+        parts
+    }
 }
 
 impl TwoLevelBvh {
@@ -186,7 +193,11 @@ impl TwoLevelBvh {
     /// instances.
     pub fn build(meshes: &[MeshGeometry<'_>], placements: &[Placement], settings: &WideSettings) -> Result<Self> {
         let top = top::capacity(placements.len());
-        check_limit("instances of a ray index", placements.len() as u64, MAX_INSTANCES as u64)?;
+        check_limit(
+            "instances of a ray index",
+            placements.len() as u64,
+            MAX_INSTANCES as u64,
+        )?;
         let trees = meshes
             .iter()
             .map(|mesh| WideBvh::build(mesh.triangles, settings))
@@ -198,7 +209,11 @@ impl TwoLevelBvh {
         let mut watch = Stopwatch::start();
         let nodes = top as u64 + trees.iter().map(|tree| tree.nodes().len() as u64).sum::<u64>();
         // Parents are numbered with three bits more.
-        check_limit("nodes of a ray index", nodes, u64::from(u32::MAX >> constants::WIDE_SLOT_BITS))?;
+        check_limit(
+            "nodes of a ray index",
+            nodes,
+            u64::from(u32::MAX >> constants::WIDE_SLOT_BITS),
+        )?;
         let instances_at = HEADER_TEXELS + NODE_TEXELS * nodes as usize;
         let triangles_at = instances_at + INSTANCE_TEXELS * placements.len();
         let triangles: usize = trees.iter().map(|tree| tree.triangles().len()).sum();
@@ -270,7 +285,11 @@ impl TwoLevelBvh {
         let mut walk = top::capacity(self.placements.len()) as u64;
         for (i, placement) in self.placements.iter().enumerate() {
             let Some(mesh) = self.meshes.get(placement.mesh as usize) else {
-                return Err(Error::setting(format!("placements[{i}].mesh"), placement.mesh, "does not exist"));
+                return Err(Error::setting(
+                    format!("placements[{i}].mesh"),
+                    placement.mesh,
+                    "does not exist",
+                ));
             };
             if mesh.has_names && std::mem::replace(&mut named[placement.mesh as usize], true) {
                 let cause = "has names for its triangles and is placed before";
@@ -289,7 +308,11 @@ impl TwoLevelBvh {
         let mesh = &self.meshes[self.placements[placement].mesh as usize];
         InstanceTransform::of(transform, &mesh.parts).ok_or_else(|| {
             let cause = "is not a transform that rays can be traced through";
-            Error::setting(format!("placements[{placement}].transform"), format!("{transform:?}"), cause)
+            Error::setting(
+                format!("placements[{placement}].transform"),
+                format!("{transform:?}"),
+                cause,
+            )
         })
     }
 
@@ -434,7 +457,9 @@ impl TwoLevelBvh {
             .map(|i| Ok((i, self.transform(i, &self.placements[i].transform)?)))
             .collect();
         match found {
-            Ok(found) => found.into_iter().for_each(|(i, transform)| self.transforms[i] = transform),
+            Ok(found) => found
+                .into_iter()
+                .for_each(|(i, transform)| self.transforms[i] = transform),
             Err(error) => {
                 self.meshes[mesh].parts = parts;
                 for (range, old) in self.mesh_texels(mesh).into_iter().zip(old) {

@@ -3,12 +3,12 @@
 //! Its binary tree is that of [`hierarchy_of`](crate::accel::lbvh::hierarchy_of), optimised, with one instance a leaf; a node takes the children of its largest children until it
 //! has eight (I. Wald, C. Benthin, S. Boulos, "Getting Rid of Packets", IEEE RT 2008).
 
+use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child};
 use crate::accel::lbvh::{LbvhSettings, hierarchy_of};
 use crate::accel::wide::grid::GridAxis;
 use crate::accel::wide::slots::assign;
 use crate::accel::wide::{SLOTS, WideNode};
-use crate::accel::Aabb;
 use crate::gpu::shaders::constants;
 use bytemuck::Zeroable;
 use glam::Vec3;
@@ -49,10 +49,21 @@ pub(super) fn build(boxes: &[Aabb], settings: &LbvhSettings) -> Top {
         0 => {}
         1 => {
             let bounds = top.bounds;
-            top.fill(0, &bounds, &[Slot { bounds, child: Child::Leaf { first: 0, count: 1 } }], &[0]);
+            top.fill(
+                0,
+                &bounds,
+                &[Slot {
+                    bounds,
+                    child: Child::Leaf { first: 0, count: 1 },
+                }],
+                &[0],
+            );
         }
         _ => {
-            let settings = LbvhSettings { leaf_size: 1, ..*settings };
+            let settings = LbvhSettings {
+                leaf_size: 1,
+                ..*settings
+            };
             top.collapse(&hierarchy_of(&boxes, &settings));
         }
     }
@@ -73,7 +84,12 @@ impl Top {
             let Child::Inner(node) = subtree else { continue };
             let slots = opened(tree, node);
             let below = self.fill(place, &bounds, &slots, &tree.order);
-            pending.extend(below.into_iter().rev().map(|(slot, place)| (slot.child, slot.bounds, place, depth + 1)));
+            pending.extend(
+                below
+                    .into_iter()
+                    .rev()
+                    .map(|(slot, place)| (slot.child, slot.bounds, place, depth + 1)),
+            );
         }
     }
 
@@ -92,7 +108,10 @@ impl Top {
         };
         let (mut instances, mut below) = (0u8, Vec::new());
         for at in 0..SLOTS {
-            let Some(slot) = (0..slots.len()).find(|i| usize::from(assigned[*i]) == at).map(|i| slots[i]) else {
+            let Some(slot) = (0..slots.len())
+                .find(|i| usize::from(assigned[*i]) == at)
+                .map(|i| slots[i])
+            else {
                 continue;
             };
             for (axis, grid) in grid.iter().enumerate() {

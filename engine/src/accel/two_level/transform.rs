@@ -91,7 +91,9 @@ fn rows_of(matrix: DMat3) -> Rows {
 }
 
 fn largest(rows: &Rows) -> f64 {
-    rows.iter().map(|row| f64::from(row.abs().max_element())).fold(0.0, f64::max)
+    rows.iter()
+        .map(|row| f64::from(row.abs().max_element()))
+        .fold(0.0, f64::max)
 }
 
 impl InstanceTransform {
@@ -113,9 +115,11 @@ impl InstanceTransform {
         let inverse = rows_of(matrix.inverse());
         let (size, inverse_size) = (largest(&rows), largest(&inverse));
         let in_range = |size: f64| size >= 1.0 / MAX_SCALE && size <= MAX_SCALE;
-        let (lower, upper) = parts.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lower, upper), part| {
-            (lower.min(part[0]), upper.max(part[1]))
-        });
+        let (lower, upper) = parts
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lower, upper), part| {
+                (lower.min(part[0]), upper.max(part[1]))
+            });
         let fits = in_range(size)
             && in_range(inverse_size)
             && size * inverse_size <= MAX_UNEVENNESS

@@ -138,7 +138,10 @@ impl TwoLevelTraversal {
         }
         let bounds = bvh.bounds();
         let origin = Vec3::from(ray.origin);
-        let reach = (bounds.lower - origin).abs().max((bounds.upper - origin).abs()).max_element();
+        let reach = (bounds.lower - origin)
+            .abs()
+            .max((bounds.upper - origin).abs())
+            .max_element();
         let world = Space::new(BoxTest::new(&bounds, ray));
         let shear = ray_shear(origin, Vec3::from(ray.direction));
         let nodes = bvh.nodes();
@@ -241,7 +244,10 @@ impl TwoLevelTraversal {
     }
 
     /// Tests the images of the triangles of a node's slots; true when that answers the query.
-    #[expect(clippy::too_many_arguments, reason = "what a node's triangles are tested with is all of the ray's state")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "what a node's triangles are tested with is all of the ray's state"
+    )]
     fn test_triangles(
         &mut self,
         bvh: &TwoLevelBvh,

@@ -2,8 +2,8 @@
 
 use super::grid::GridAxis;
 use super::{SLOTS, WideNode};
-use crate::accel::bvh2::Bvh2Triangle;
 use crate::accel::Aabb;
+use crate::accel::bvh2::Bvh2Triangle;
 use glam::Vec3;
 
 /// Decoded boxes again, from the triangles up, of nodes whose first has the number `first_node`, over triangles whose first is at the place `first_triangle`.

@@ -51,7 +51,7 @@ impl Lights {
         };
         let first_copies = geometry.first_copies(emits);
         let mut has_unsampled = false;
-        for index in 0..geometry.triangles.len() {
+        for index in 0..geometry.in_world() {
             let triangle = geometry.triangles[index];
             if !emits(&triangle) {
                 continue;
@@ -88,7 +88,7 @@ impl Lights {
                 powers.push(luminance(triangle_power(emission, area, double_sided)));
                 records.push(SceneLight {
                     kind: LIGHT_TRIANGLE,
-                    triangle: index as u32,
+                    triangle: geometry.name(index),
                     ..SceneLight::default()
                 });
             }

@@ -6,6 +6,7 @@
 mod airlight;
 mod bodies;
 mod geometry;
+mod kept;
 mod lights;
 mod materials;
 mod media;
@@ -14,11 +15,14 @@ mod punctual;
 mod textures;
 
 use std::path::Path;
+use std::sync::Mutex;
+use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
 use self::geometry::{Geometry, check_placed, visible_objects};
+use self::kept::{Keeping, KeptInstances};
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
 use self::materials::{material_record, materials_by_use};
@@ -28,7 +32,9 @@ use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
 use crate::accel::bvh2::Bvh2Settings;
-use crate::accel::{DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
+use crate::accel::two_level::{TwoLevelBvh, TwoLevelWork};
+use crate::accel::wide::WideSettings;
+use crate::accel::{Aabb, DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::sets::{IndexSet, MediaSet, SceneSet};
@@ -53,8 +59,19 @@ pub struct GpuScene {
     emission_cdf: Option<Vec<f32>>,
     punctual_lights: PunctualLights,
     index: IndexOnDevice,
+    /// Box of what rays may meet in the index, where instances are kept.
+    index_bounds: Aabb,
+    /// Where instances are kept: what moves them.
+    kept: Option<Mutex<Kept>>,
     buffers: SceneBuffers,
     media: Option<GpuMedia>,
+}
+
+/// Kept instances and their index, as the device has them.
+#[derive(Debug)]
+struct Kept {
+    instances: KeptInstances,
+    index: TwoLevelBvh,
 }
 
 /// Which kinds of lights there are to choose: emitters without area and lights without power are none.
@@ -80,6 +97,7 @@ struct SceneBuffers {
     cdf: TexelView,
     environment: TexelView,
     albedo_table: TexelView,
+    instances: TexelView,
 }
 
 /// How kernels trace rays that stop for good at a quota.
@@ -122,7 +140,9 @@ fn index_for(
         Ok(_) => Ok(asked),
         Err(Error::LimitExceeded { .. }) => {
             let because = match asked.traversal {
-                DeviceTraversal::Wide | DeviceTraversal::TwoLevel => "a round of its rays is longer than the loops of a software device",
+                DeviceTraversal::Wide | DeviceTraversal::TwoLevel => {
+                    "a round of its rays is longer than the loops of a software device"
+                }
                 _ => "a leaf of the kd-tree is longer than the loops of a software device",
             };
             drop(asked);
@@ -134,8 +154,30 @@ fn index_for(
     }
 }
 
+/// The index of two levels over kept instances.
+fn index_over_instances(
+    gpu: &Gpu,
+    geometry: &mut Geometry,
+    profile: &SceneProfile,
+    settings: &WideSettings,
+) -> Result<Option<(IndexOnDevice, Kept)>> {
+    let Some(mut instances) = geometry.kept.clone() else {
+        return Ok(None);
+    };
+    let begin = Instant::now();
+    let index = instances.index(&geometry.triangles, settings)?;
+    let build_ms = 1e3 * begin.elapsed().as_secs_f64();
+    let on_device = IndexOnDevice::of(gpu, &index, IndexReport::of("two-level", build_ms, &index))?;
+    let iterations = ray_iterations(profile).min(SOFTWARE_LOOP_CAP / 2);
+    on_device
+        .traversal
+        .quota_within(gpu.caps(), 1, iterations, profile.has_alpha())?;
+    geometry.kept = Some(instances.clone());
+    Ok(Some((on_device, Kept { instances, index })))
+}
+
 impl GpuScene {
-    /// Checks the scene, builds its index by the binned surface area heuristic on the host's threads and uploads everything.
+    /// Checks the scene, builds its index on the host's threads, of the kind that is the default, and uploads everything.
     ///
     /// # Errors
     /// [`Error::Scene`] for a scene that does not pass [`Scene::check`],
@@ -144,8 +186,14 @@ impl GpuScene {
         Self::with_index(gpu, scene, &IndexKind::default())
     }
 
-    /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it. A kd-tree with a leaf that is too long for a software device's loops,
+    /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it, but for two levels. A kd-tree with a leaf that is too long for a software device's loops,
     /// as where thousands of triangles lie in one place, is replaced by the binned hierarchy, and the report says so ([`IndexReport::instead_because`]).
+    ///
+    /// With [`IndexKind::TwoLevel`] instances are kept: meshes that are placed more than once are stored once, but for those that emit light, those that are
+    /// bodies in scenes with media, and instances by transforms too uneven for rays ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)). Their vertices are in
+    /// other places by rounding in f32, so pictures differ by as much. [`IndexKind::Automatic`] keeps instances where flattening them would need at least four times as
+    /// many bytes of geometry and index as that, and 64 MiB or more, or more texels than the device can bind; elsewhere it is the wide hierarchy.
+    /// What is rasterized needs flattened scenes.
     ///
     /// # Errors
     /// As [`GpuScene::new`], and [`Error::Setting`] for settings of the index that are out of range.
@@ -159,12 +207,31 @@ impl GpuScene {
     /// As [`GpuScene::with_index`]; what cannot be read or written there is none.
     pub fn with_kept_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind, folder: Option<&Path>) -> Result<Self> {
         scene.check()?;
-        let profile = SceneProfile::of(scene);
-        check_placed(scene, &profile, gpu.caps().max_texel_buffer_elements)?;
-        let mut geometry = Geometry::flatten(scene, &profile)?;
+        let mut profile = SceneProfile::of(scene);
+        let limit = gpu.caps().max_texel_buffer_elements;
+        let keeping = match kind {
+            IndexKind::TwoLevel(settings) => Keeping::of(scene, &profile).map(|keeping| (keeping, settings)),
+            IndexKind::Automatic(settings) => Keeping::of(scene, &profile)
+                .filter(|keeping| keeping.pays(scene, &profile, limit))
+                .map(|keeping| (keeping, settings)),
+            _ => None,
+        };
+        check_placed(scene, &profile, keeping.as_ref().map(|(keeping, _)| keeping), limit)?;
+        let mut geometry = match &keeping {
+            Some((keeping, _)) => Geometry::keep(scene, &profile, keeping)?,
+            None => Geometry::flatten(scene, &profile)?,
+        };
+        profile.keeps_instances = geometry.kept.is_some();
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
-        let index = index_for(gpu, &geometry, &profile, kind, folder)?;
+        let kept = match &keeping {
+            Some((_, settings)) => index_over_instances(gpu, &mut geometry, &profile, settings)?,
+            None => None,
+        };
+        let (index, kept) = match kept {
+            Some((index, kept)) => (index, Some(Mutex::new(kept))),
+            None => (index_for(gpu, &geometry, &profile, kind, folder)?, None),
+        };
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
         let placed = materials
@@ -185,9 +252,13 @@ impl GpuScene {
         let buffers = SceneBuffers::upload(gpu, &geometry, &records, &textures, &lights, albedo)?;
         let media = bodies.map(|bodies| GpuMedia::new(gpu, scene, bodies)).transpose()?;
         Ok(Self {
-            profile,
             bsdf,
-            objects: visible_objects(scene),
+            // What is rasterized is drawn triangle by triangle.
+            objects: match profile.keeps_instances {
+                true => Vec::new(),
+                false => visible_objects(scene),
+            },
+            profile,
             bounds,
             surface_area: geometry.surface_area(),
             light_power: lights.power,
@@ -196,6 +267,8 @@ impl GpuScene {
             emission_cdf: lights.emission_cdf,
             punctual_lights: lights.punctual,
             index,
+            index_bounds: kept.as_ref().map_or(Aabb::EMPTY, |kept| lock(kept).index.bounds()),
+            kept,
             buffers,
             media,
         })
@@ -204,6 +277,11 @@ impl GpuScene {
     /// What the scene needs.
     pub fn profile(&self) -> &SceneProfile {
         &self.profile
+    }
+
+    /// What the index of two levels has built so far, where instances are kept.
+    pub fn index_work(&self) -> Option<TwoLevelWork> {
+        self.kept.as_ref().map(|kept| lock(kept).index.work())
     }
 
     /// What its materials need of the scattering function.
@@ -253,7 +331,7 @@ impl GpuScene {
         self.bounds
     }
 
-    /// What is rasterized of it: all triangles but those of invisible boundaries.
+    /// What is rasterized of it: all triangles but those of invisible boundaries; none where instances are kept ([`SceneProfile::keeps_instances`]).
     pub fn surfaces(&self) -> Surfaces<'_> {
         Surfaces {
             set: self.scene_set(),
@@ -379,8 +457,14 @@ impl GpuScene {
             scene_cdf: &b.cdf,
             scene_environment: &b.environment,
             scene_albedo_table: &b.albedo_table,
+            scene_instances: &b.instances,
         }
     }
+}
+
+/// What is behind a lock, also where a thread has panicked that held it: what it holds is changed as a whole.
+fn lock(kept: &Mutex<Kept>) -> std::sync::MutexGuard<'_, Kept> {
+    kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 impl GpuScene {
@@ -455,6 +539,10 @@ impl SceneBuffers {
             cdf: floats("light probabilities", c, &lights.cdf)?,
             environment: quarters("environment", c, &lights.environment)?,
             albedo_table: floats("albedo table", b, albedo)?,
+            instances: match &geometry.kept {
+                Some(kept) => quarters("instances", a, bytemuck::cast_slice(&kept.records))?,
+                None => no_words,
+            },
         })
     }
 }
