@@ -6,6 +6,7 @@
 
 layout(local_size_x = 1) in;
 
+#define CLERESTORY_FLAT_SCENE
 #include "scene/bindings.glsl"
 #include "scene/media.glsl"
 

@@ -32,12 +32,14 @@ fn kernels_load_every_word_of_a_record() {
         wanted.light = numbered(301);
         wanted.environment = numbered(401);
         wanted.medium = numbered(501);
+        wanted.instance = numbered(601);
         let triangles = texels(gpu, wanted.triangle);
         let materials = texels(gpu, wanted.material);
         let textures = texels(gpu, wanted.texture_record);
         let lights = texels(gpu, wanted.light);
         let environment = texels(gpu, wanted.environment);
         let medium = texels(gpu, wanted.medium);
+        let instance = texels(gpu, wanted.instance);
         let no_words = texels(gpu, [0u32; 4]);
         let no_floats = gpu
             .texels_with("none", Category::Staging, vk::Format::R32_SFLOAT, &[0.0f32])
@@ -56,6 +58,7 @@ fn kernels_load_every_word_of_a_record() {
             scene_cdf: &no_floats,
             scene_environment: &environment,
             scene_albedo_table: &no_floats,
+            scene_instances: &instance,
         };
         let media = MediaSet {
             media_records: &medium,
