@@ -1,5 +1,6 @@
 use super::*;
 use crate::accel::bvh2::tests::{grid, hard_rays, hard_scenes, same_bits, soup};
+use crate::accel::input::can_be_met;
 use crate::accel::test_support::{Random, U, brute_force, with_threads};
 use crate::accel::{FINISHED, NO_HIT};
 use glam::{DMat3, DQuat};

@@ -223,9 +223,16 @@ impl KeptInstances {
         self.kept.get(object).is_some_and(|kept| *kept)
     }
 
+    /// The place of an instance among those that are kept, which come in the order of the scene.
+    fn place(&self, object: usize) -> Option<usize> {
+        self.instances
+            .binary_search_by_key(&object, |instance| instance.object)
+            .ok()
+    }
+
     /// The place of a kept instance among those of its index.
     pub fn placement(&self, object: usize) -> Option<usize> {
-        let place = self.instances.iter().position(|instance| instance.object == object)?;
+        let place = self.place(object)?;
         Some(place + usize::from(!self.names.is_empty()))
     }
 
@@ -367,8 +374,8 @@ impl KeptInstances {
 
     /// Puts a kept instance to another place.
     pub fn moved(&mut self, object: usize, transform: &DAffine3) {
-        if let Some(instance) = self.instances.iter_mut().find(|instance| instance.object == object) {
-            instance.transform = *transform;
+        if let Some(place) = self.place(object) {
+            self.instances[place].transform = *transform;
         }
     }
 }

@@ -6,6 +6,7 @@
 mod airlight;
 mod bodies;
 mod geometry;
+mod index;
 mod kept;
 mod lights;
 mod materials;
@@ -16,12 +17,12 @@ mod textures;
 
 use std::path::Path;
 use std::sync::Mutex;
-use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
 use self::geometry::{Geometry, check_placed, visible_objects};
+use self::index::{index_for, index_over_instances};
 use self::kept::{Keeping, KeptInstances};
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
@@ -31,9 +32,8 @@ use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
-use crate::accel::bvh2::Bvh2Settings;
+use crate::Result;
 use crate::accel::two_level::{TwoLevelBvh, TwoLevelWork};
-use crate::accel::wide::WideSettings;
 use crate::accel::{Aabb, DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
@@ -42,7 +42,6 @@ use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
 use crate::gpu::{Category, Gpu, SOFTWARE_LOOP_CAP, TexelView};
 use crate::raster::{ObjectTriangles, SurfaceFeatures, Surfaces};
 use crate::scene::{Environment, LightKind, Material, Scene, SceneProfile};
-use crate::{Error, Result};
 
 /// A scene in device memory. Make it once and render it with any technique.
 #[derive(Debug)]
@@ -119,61 +118,6 @@ pub(crate) fn ray_iterations(profile: &SceneProfile) -> u32 {
         (false, true) => SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES,
         (true, true) => SOFTWARE_LOOP_CAP / 2 / SHADOW_SURFACES_ALPHA,
     }
-}
-
-/// The index that was asked for, or the default one where rays in that could not be stopped in time.
-fn index_for(
-    gpu: &Gpu,
-    geometry: &Geometry,
-    profile: &SceneProfile,
-    kind: &IndexKind,
-    folder: Option<&Path>,
-) -> Result<IndexOnDevice> {
-    let corners = geometry.corners();
-    let asked = kind.build_or_read_for(gpu, &corners, folder)?;
-    // Techniques may trace two rays in a dispatch.
-    let iterations = ray_iterations(profile).min(SOFTWARE_LOOP_CAP / 2);
-    match asked
-        .traversal
-        .quota_within(gpu.caps(), 1, iterations, profile.has_alpha())
-    {
-        Ok(_) => Ok(asked),
-        Err(Error::LimitExceeded { .. }) => {
-            let because = match asked.traversal {
-                DeviceTraversal::Wide | DeviceTraversal::TwoLevel => {
-                    "a round of its rays is longer than the loops of a software device"
-                }
-                _ => "a leaf of the kd-tree is longer than the loops of a software device",
-            };
-            drop(asked);
-            let mut index = IndexKind::Bvh2(Bvh2Settings::default()).build_for(gpu, &corners)?;
-            index.report.instead_because = Some(because);
-            Ok(index)
-        }
-        Err(error) => Err(error),
-    }
-}
-
-/// The index of two levels over kept instances.
-fn index_over_instances(
-    gpu: &Gpu,
-    geometry: &mut Geometry,
-    profile: &SceneProfile,
-    settings: &WideSettings,
-) -> Result<Option<(IndexOnDevice, Kept)>> {
-    let Some(mut instances) = geometry.kept.clone() else {
-        return Ok(None);
-    };
-    let begin = Instant::now();
-    let index = instances.index(&geometry.triangles, settings)?;
-    let build_ms = 1e3 * begin.elapsed().as_secs_f64();
-    let on_device = IndexOnDevice::of(gpu, &index, IndexReport::of("two-level", build_ms, &index))?;
-    let iterations = ray_iterations(profile).min(SOFTWARE_LOOP_CAP / 2);
-    on_device
-        .traversal
-        .quota_within(gpu.caps(), 1, iterations, profile.has_alpha())?;
-    geometry.kept = Some(instances.clone());
-    Ok(Some((on_device, Kept { instances, index })))
 }
 
 impl GpuScene {
