@@ -8,7 +8,6 @@ use crate::accel::input::can_be_met;
 use crate::accel::wide::WideNode;
 use crate::accel::wide::refit::refit;
 use crate::accel::{Aabb, IndexStatistics, MAX_COORDINATE};
-use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use glam::{DAffine3, Vec3};
@@ -38,8 +37,7 @@ impl TwoLevelBvh {
             let place = top.places[i];
             let node = InstanceNode {
                 inverse_x: transform.inverse[0],
-                flags: u32::from(transform.is_identity()) * constants::INSTANCE_IDENTITY
-                    | u32::from(transform.mirrors()) * constants::INSTANCE_MIRRORED,
+                flags: transform.flags(),
                 inverse_y: transform.inverse[1],
                 parent: nodes[place as usize].parent,
                 inverse_z: transform.inverse[2],

@@ -114,7 +114,7 @@ impl InstanceTransform {
         }
         let inverse = rows_of(matrix.inverse());
         let (size, inverse_size) = (largest(&rows), largest(&inverse));
-        let in_range = |size: f64| size >= 1.0 / MAX_SCALE && size <= MAX_SCALE;
+        let in_range = |size: f64| (1.0 / MAX_SCALE..=MAX_SCALE).contains(&size);
         let (lower, upper) = parts
             .iter()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lower, upper), part| {
@@ -171,6 +171,12 @@ impl InstanceTransform {
     /// Whether it turns fronts into backs, which swapped corners undo.
     pub fn mirrors(&self) -> bool {
         matrix_of(&self.rows).determinant() < 0.0
+    }
+
+    /// What kernels are told of it: `INSTANCE_IDENTITY`, `INSTANCE_MIRRORED`.
+    pub(crate) fn flags(&self) -> u32 {
+        let flag = |holds: bool, bit| if holds { bit } else { 0 };
+        flag(self.is_identity(), constants::INSTANCE_IDENTITY) | flag(self.mirrors(), constants::INSTANCE_MIRRORED)
     }
 
     /// The corners of a triangle in world space, the second and the third swapped where it mirrors.

@@ -11,7 +11,7 @@ use super::bodies::bounds_body;
 use super::geometry::{Geometry, corners_of, has_attributes, is_traceable, numbered_instances};
 use crate::accel::two_level::{INSTANCE_BYTES, InstanceTransform, MAX_INSTANCES, MeshGeometry, Placement, TwoLevelBvh};
 use crate::accel::wide::WideSettings;
-use crate::gpu::shaders::constants::{INSTANCE_IDENTITY, INSTANCE_MIRRORED};
+use crate::gpu::shaders::constants::INSTANCE_IDENTITY;
 use crate::gpu::shaders::types::{SceneInstance, SceneTriangle};
 use crate::scene::{Instance, Mesh, Scene, SceneProfile};
 use crate::{Error, Result};
@@ -160,8 +160,7 @@ fn placed(record: &mut SceneInstance, transform: &InstanceTransform) {
     record.row_y = transform.rows[1].to_array();
     record.row_z = transform.rows[2].to_array();
     record.translation = transform.translation.to_array();
-    record.flags =
-        u32::from(transform.is_identity()) * INSTANCE_IDENTITY | u32::from(transform.mirrors()) * INSTANCE_MIRRORED;
+    record.flags = transform.flags();
 }
 
 impl Geometry {
