@@ -13,6 +13,7 @@ pub mod metals;
 mod mtl;
 pub mod normal_map;
 mod obj;
+mod placed;
 pub(crate) mod ply;
 pub(crate) mod profile;
 pub mod sidecar;

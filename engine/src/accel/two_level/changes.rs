@@ -115,7 +115,7 @@ impl TwoLevelBvh {
     }
 
     /// Refits the tree of a mesh to its triangles where they are now, and makes the tree over the instances anew. Triangles that were left out stay
-    /// so, and those that have lost their area shrink to points. [`Self::mesh_texels`] have changed beside what [`Self::move_instances`] changes.
+    /// so, and those that have lost their area shrink to points. Statistics keep the cost of the tree as it was built. [`Self::mesh_texels`] have changed beside what [`Self::move_instances`] changes.
     ///
     /// # Errors
     /// [`Error::Setting`] for a mesh that does not exist, for another number of triangles, for one that has moved out of range, and for a mesh that its

@@ -233,6 +233,8 @@ fn plant(scene: &mut Scene, seed: u32, count: u32, parts: &TreeParts, [soil, bar
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::super::generate;
     use crate::scene::SceneProfile;
 
@@ -249,6 +251,19 @@ mod tests {
         assert_eq!(of_trees(&many), 10_000 * of_trees(&few) / 8);
         assert_eq!(of_trees(&few) / 8, TREE_TRIANGLES);
         assert!(many.triangles > 500_000_000);
+    }
+
+    #[test]
+    fn bounds_are_those_of_all_vertices() {
+        let scene = generate("builtin:forest?trees=2&instances=30").expect("a scene");
+        let vertices = scene.instances.iter().flat_map(|instance| {
+            let positions = scene.meshes[instance.mesh as usize].positions.iter();
+            positions.map(|p| instance.transform.transform_point3(p.as_dvec3()))
+        });
+        let (low, high) = vertices.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+            (low.min(p), high.max(p))
+        });
+        assert_eq!(SceneProfile::of(&scene).bounds, Some([low.to_array(), high.to_array()]));
     }
 
     /// As the parameter's meaning says.
