@@ -32,6 +32,8 @@ use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
+#[cfg(doc)]
+use crate::Error;
 use crate::Result;
 use crate::accel::two_level::{TwoLevelBvh, TwoLevelWork};
 use crate::accel::{Aabb, DeviceTraversal, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
