@@ -1,5 +1,5 @@
 //! A picture does not depend on the ray index: every index reports the hit of least distance, of equal ones the triangle of least index,
-//! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included.
+//! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included; but for instances that two levels keep.
 
 use clerestory::accel::IndexKind;
 use std::sync::Arc;
@@ -76,7 +76,9 @@ fn pictures_are_the_same_to_the_bit_with_every_index() {
         let glass = builtin("builtin:cornell-box?sphere=glass");
         for (what, scene) in [("city", &city), ("glass sphere", &glass), ("doubled", &doubled())] {
             let mut first: Option<(Vec<u32>, f64)> = None;
-            for name in IndexKind::NAMES {
+            // The city's boxes are instances, which two levels keep, with vertices that are elsewhere by rounding (tests/tests/instances.rs).
+            let exact = |name: &&str| what != "city" || *name != "two-level";
+            for name in IndexKind::NAMES.into_iter().filter(exact) {
                 let rendered = render(gpu, scene, &name.parse().unwrap()).unwrap();
                 let index = rendered.report.index;
                 assert_eq!(index.kind, name);

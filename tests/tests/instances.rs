@@ -387,10 +387,10 @@ fn instances_are_kept_where_that_needs_much_less() {
             assert_eq!(on_device.surfaces().triangles == 0, keeps);
             (on_device.index_report().kind, keeps)
         };
-        // Below 64 MiB; below four times; above both.
+        // Below 64 MiB; below eight times; above both.
         assert_eq!(kind("builtin:forest?trees=1&instances=8"), ("wide", false));
         assert_eq!(kind("builtin:forest?trees=60&instances=8"), ("wide", false));
-        assert_eq!(kind("builtin:forest?trees=1&instances=40"), ("two-level", true));
+        assert_eq!(kind("builtin:forest?trees=1&instances=60"), ("two-level", true));
         // Nothing to keep: the same tree as the wide one, below one instance.
         let scene = builtin("builtin:cornell-box");
         let alone = uploaded(gpu, &scene, "two-level");

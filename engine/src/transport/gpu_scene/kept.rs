@@ -17,7 +17,7 @@ use crate::scene::{Instance, Mesh, Scene, SceneProfile};
 use crate::{Error, Result};
 
 /// How many times what keeping instances needs flattening must need for that to be chosen: rays in two levels take longer.
-pub(super) const WORTH_RATIO: u64 = 4;
+pub(super) const WORTH_RATIO: u64 = 8;
 
 /// Bytes that flattening must need, at least, for instances to be kept where nothing else is asked for.
 pub(super) const WORTH_BYTES: u64 = 64 << 20;

@@ -137,7 +137,7 @@ impl GpuScene {
     ///
     /// With [`IndexKind::TwoLevel`] instances are kept: meshes that are placed more than once are stored once, but for those that emit light, those that are
     /// bodies in scenes with media, and instances by transforms too uneven for rays ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)). Their vertices are in
-    /// other places by rounding in f32, so pictures differ by as much. [`IndexKind::Automatic`] keeps instances where flattening them would need at least four times as
+    /// other places by rounding in f32, so pictures differ by as much. [`IndexKind::Automatic`] keeps instances where flattening them would need at least eight times as
     /// many bytes of geometry and index as that, and 64 MiB or more, or more texels than the device can bind; elsewhere it is the wide hierarchy.
     /// What is rasterized needs flattened scenes.
     ///
