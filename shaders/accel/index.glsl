@@ -13,7 +13,7 @@
 const uint INDEX_BVH2 = 0u;
 const uint INDEX_KD = 1u;
 const uint INDEX_WIDE = 2u;
-const uint INDEX_TWO_LEVEL = 3u;
+const uint INDEX_TWO_LEVEL = 4u;
 
 layout(constant_id = 102) const uint INDEX_KIND = INDEX_BVH2;
 

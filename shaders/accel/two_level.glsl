@@ -122,9 +122,13 @@ uint two_level_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit)
         do {
             ++iterations;
             INDEX_COUNT_ONE(nodes)
-            uvec4 frame;
-            uvec4 below;
-            uint met = wide_boxes_met(boxes, backwards, TWO_LEVEL_HEADER_TEXELS + WIDE_NODE_TEXELS * node, ray.t_min, hit.t, frame, below);
+            uint texel = TWO_LEVEL_HEADER_TEXELS + WIDE_NODE_TEXELS * node;
+            uvec4 frame = index_texel(texel);
+            uvec4 below = index_texel(texel + 1u);
+            uvec4 x = index_texel(texel + 2u);
+            uvec4 y = index_texel(texel + 3u);
+            uvec4 z = index_texel(texel + 4u);
+            uint met = wide_slots_met(boxes, backwards, frame, x, y, z, ray.t_min, hit.t) & below.z;
             uint found = met & WIDE_TRIANGLE_MASK;
             uint order = wide_in_order(met >> WIDE_INNER_SHIFT, octant);
             if (INDEX_RESUMES) {

@@ -37,7 +37,7 @@ layout(set = 2, binding = 10) uniform textureBuffer scene_cdf;
 // of light sampling per solid angle; the last row is there twice (transport/environment.glsl).
 layout(set = 2, binding = 11) uniform utextureBuffer scene_environment;
 layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
-layout(set = 2, binding = 13) uniform utextureBuffer scene_instances;  // by their first triangles, ascending
+layout(set = 2, binding = 14) uniform utextureBuffer scene_instances;  // by their first triangles, ascending
 
 float distribution_cdf(uint index) { return texelFetch(scene_cdf, int(index)).x; }
 vec4 environment_texel(uint index) {

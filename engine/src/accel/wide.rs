@@ -13,7 +13,6 @@
 
 mod collapse;
 pub(super) mod grid;
-pub(super) mod refit;
 pub(super) mod slots;
 pub mod traverse;
 

@@ -1,12 +1,12 @@
 //! What changes when instances move or meshes are refitted: the tree over the instances is made anew, and a mesh's boxes.
 
+use super::refit::refit;
 use super::{
     HEADER_TEXELS, Header, INSTANCE_TEXELS, InstanceNode, InstanceRecord, NODE_TEXELS, TwoLevelBvh, parts_of, top,
 };
 use crate::accel::bvh2::Bvh2Triangle;
 use crate::accel::input::can_be_met;
 use crate::accel::wide::WideNode;
-use crate::accel::wide::refit::refit;
 use crate::accel::{Aabb, IndexStatistics, MAX_COORDINATE};
 use crate::{Error, Result};
 use bytemuck::Zeroable;

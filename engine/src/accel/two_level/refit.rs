@@ -1,19 +1,14 @@
 //! New boxes for a tree whose triangles have moved: its shape stays.
 
-use super::grid::GridAxis;
-use super::{SLOTS, WideNode};
 use crate::accel::Aabb;
 use crate::accel::bvh2::Bvh2Triangle;
+use crate::accel::wide::grid::GridAxis;
+use crate::accel::wide::{SLOTS, WideNode};
 use glam::Vec3;
 
 /// Decoded boxes again, from the triangles up, of nodes whose first has the number `first_node`, over triangles whose first is at the place `first_triangle`.
 /// Children come behind their parents. Returns the box of all; empty without triangles.
-pub(in crate::accel) fn refit(
-    nodes: &mut [WideNode],
-    first_node: u32,
-    triangles: &[Bvh2Triangle],
-    first_triangle: u32,
-) -> Aabb {
+pub(super) fn refit(nodes: &mut [WideNode], first_node: u32, triangles: &[Bvh2Triangle], first_triangle: u32) -> Aabb {
     let mut own = vec![Aabb::EMPTY; nodes.len()];
     for index in (0..nodes.len()).rev() {
         let node = &mut nodes[index];
