@@ -223,18 +223,22 @@ fn stopped_traversals_go_on_without_loss_or_repetition() {
                 whole.run(&bvh, &ray, u64::MAX, &mut |_, _| true, &mut counters);
                 let mut parts = start;
                 let mut parts_counters = TraversalCounters::default();
+                // The least that gets on: a node beyond the way back, and the round that goes into an instance.
+                quota = u64::from(bvh.statistics().max_depth + 1 + constants::WIDE_ROUND_ITERATIONS);
+                let mut runs = 0;
                 while parts.resume != FINISHED {
-                    quota = (quota + 7) % 40;
-                    let quota = u64::from(DeviceTraversal::TwoLevel.least_quota()) + quota;
                     parts.run(&bvh, &ray, quota, &mut |_, _| true, &mut parts_counters);
-                    stops += u32::from(parts.resume != FINISHED);
+                    runs += 1;
+                    assert!(runs < 10_000, "{name}: no progress");
                 }
                 assert!(same_bits(&whole.hit, &parts.hit), "{name}: {ray:?}");
-                assert_eq!(counters.triangles, parts_counters.triangles, "{name}: {ray:?}");
+                // Fewer when the hit so far culls a sibling that the stack would have kept.
+                assert!(parts_counters.triangles <= counters.triangles, "{name}: {ray:?}");
+                stops += runs - 1;
             }
         }
     }
-    assert!(stops > 1000, "{stops}");
+    assert!(stops > 1000, "{stops} stops, the last quota {quota}");
 }
 
 #[test]
