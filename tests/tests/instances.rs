@@ -15,6 +15,9 @@ use clerestory_tests::render::{Rendered, builtin, finish, independent, tracer_of
 use clerestory_tests::with_gpu;
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 
+/// Iterations at which rays among prisms stop, the least that there is.
+const SMALL_QUOTA: u32 = 128;
+
 /// A leaning prism with coordinates of few bits, so that images under [`exact`] transforms have no rounding.
 fn prism(material: u32) -> Mesh {
     let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z) / 64.0;
@@ -134,7 +137,7 @@ fn instances_without_rounding_have_the_pictures_of_flattened_ones() {
             assert!(truth.mean()[0].0 > 0.0, "{what}: dark");
             let kept = uploaded(gpu, scene, "two-level");
             assert!(kept.profile().keeps_instances && kept.bounds() == uploaded(gpu, scene, "bvh2").bounds());
-            for ray_quota in [32_768, 100] {
+            for ray_quota in [32_768, SMALL_QUOTA] {
                 let settings = PathTracerSettings {
                     ray_quota,
                     ..PathTracerSettings::default()
@@ -325,6 +328,9 @@ fn moved_instances_and_refitted_meshes_are_as_if_made_so() {
     });
 }
 
+/// Bytes that the tree over the ground may differ by.
+const OTHER_TREE: u64 = 32_768;
+
 /// Bytes of all live allocations.
 fn bytes(gpu: &Gpu) -> u64 {
     gpu.memory_report().bytes.iter().map(|(_, bytes)| bytes).sum()
@@ -348,10 +354,14 @@ fn memory_grows_with_meshes_and_little_with_instances() {
         let [few, many] = [100, 1100].map(used);
         // What is flattened, four trunks and four crowns.
         assert_eq!((few.2, many.2), (9, 9));
-        assert_eq!(many.1 - few.1, 2000 * INSTANCE_BYTES);
+        // The land is larger: as many triangles, in another tree.
+        assert!(
+            (many.1 - few.1).abs_diff(2000 * INSTANCE_BYTES) < OTHER_TREE,
+            "{few:?} {many:?}"
+        );
         // A record of 64 bytes each besides, and what allocations are rounded up by.
         assert!(
-            many.0 - few.0 <= 2000 * (INSTANCE_BYTES + 64) + 65_536,
+            many.0 - few.0 <= 2000 * (INSTANCE_BYTES + 64) + 2 * OTHER_TREE,
             "{few:?} {many:?}"
         );
         assert!(many.0 < 2 * few.0, "{few:?} {many:?}");
