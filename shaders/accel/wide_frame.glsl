@@ -33,14 +33,15 @@ float wide_power(int exponent) { return uintBitsToFloat(uint(exponent + WIDE_EXP
 // The last multiple of a step that is not above a number, in steps. The number is no negative zero.
 float wide_floor(float x, int exponent) {
     float whole = floor(x * wide_power(-exponent));
-    float of_small = floatBitsToInt(x) < 0 ? -1.0 : 0.0;
+    // By integers, since a choice between -1 and 0 may become a negative zero, whose bits a corner would keep.
+    float of_small = float(floatBitsToInt(x) >> 31);
     return wide_exponent(x) < exponent ? of_small : whole;
 }
 
 // The first that is not below it.
 float wide_ceil(float x, int exponent) {
     float whole = ceil(x * wide_power(-exponent));
-    float of_small = floatBitsToInt(x) > 0 ? 1.0 : 0.0;
+    float of_small = float(clamp(floatBitsToInt(x), 0, 1));
     return wide_exponent(x) < exponent ? of_small : whole;
 }
 

@@ -24,6 +24,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("accel/lbvh_climb.comp", "MemberOffset"),
     ("accel/lbvh_refit.comp", "MemberOffset"),
     ("accel/lbvh_refit_triangles.comp", "MemberOffset"),
+    ("accel/wide_refit.comp", "MemberOffset"),
     // Vectors of three numbers one behind the other.
     ("accel/lbvh_boxes.comp", "ArrayStride"),
     ("techniques/preview/preview_display.comp", "ArrayStride"),

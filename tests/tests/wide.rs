@@ -201,7 +201,10 @@ fn assert_same(found: &WideBvh, expected: &WideBvh, what: &str) {
     for (place, (node, other)) in nodes.iter().zip(others).enumerate() {
         assert_eq!(node, other, "{what}: node {place}");
     }
-    assert!(found.texels() == expected.texels(), "{what}");
+    for (place, (texel, other)) in found.texels().iter().zip(expected.texels()).enumerate() {
+        assert_eq!(texel, other, "{what}: texel {place}, of {} nodes", nodes.len());
+    }
+    assert_eq!(found.texels().len(), expected.texels().len(), "{what}");
     assert_eq!(found.statistics(), expected.statistics(), "{what}");
 }
 
