@@ -81,39 +81,34 @@ impl SmallSort {
         let bins = 1 << digit_bits;
         let (key_words, has_values) = (options.key.words(), options.values);
         let shared_bytes = gpu.caps().max_shared_memory;
-        if options.form == Form::Auto && gpu.caps().kind == DeviceKind::Cpu {
-            let up_to = capacity_in_buffers(shared_bytes, lanes, bins, digits);
-            if up_to == 0 {
-                return Ok(None);
-            }
-            let pipeline = gpu.compute_pipeline(&radix_one_group::Spec {
+        let in_buffers = options.form == Form::Auto && gpu.caps().kind == DeviceKind::Cpu;
+        let up_to = if in_buffers {
+            capacity_in_buffers(shared_bytes, lanes, bins, digits)
+        } else {
+            capacity(shared_bytes, lanes, bins)
+        };
+        if up_to == 0 {
+            return Ok(None);
+        }
+        let (kernel, moves) = if in_buffers {
+            let spec = radix_one_group::Spec {
                 local_size_x: lanes,
                 bins,
                 key_words,
                 has_values,
-            })?;
-            return Ok(Some(Self {
-                up_to,
-                moves: digits,
-                kernel: Kernel::Buffers(pipeline),
-            }));
-        }
-        let up_to = capacity(shared_bytes, lanes, bins);
-        if up_to == 0 {
-            return Ok(None);
-        }
-        let pipeline = gpu.compute_pipeline(&radix_small::Spec {
-            local_size_x: lanes,
-            bins,
-            key_words,
-            has_values,
-            capacity: up_to,
-        })?;
-        Ok(Some(Self {
-            up_to,
-            moves: 1,
-            kernel: Kernel::Shared(pipeline),
-        }))
+            };
+            (Kernel::Buffers(gpu.compute_pipeline(&spec)?), digits)
+        } else {
+            let spec = radix_small::Spec {
+                local_size_x: lanes,
+                bins,
+                key_words,
+                has_values,
+                capacity: up_to,
+            };
+            (Kernel::Shared(gpu.compute_pipeline(&spec)?), 1)
+        };
+        Ok(Some(Self { up_to, moves, kernel }))
     }
 
     pub fn info(&self) -> PipelineInfo {

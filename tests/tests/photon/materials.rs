@@ -118,10 +118,10 @@ fn fixture(name: &str, floor_material: Material, wall: Material) -> Scene {
     scene
 }
 
-fn expect_material(gpu: &Gpu, scene: &Scene, photons: u32) {
+fn expect_material(gpu: &Gpu, scene: &Scene) {
     let settings = PhotonSettings {
         direct_photons: true,
-        photons,
+        photons: PHOTONS,
         ..fixed("bounces=1..4", RADIUS)
     };
     expect_agreement(gpu, scene, &settings, [16, 384], [BIAS; 3]);
@@ -138,7 +138,7 @@ fn walls_of_all_kinds_light_the_floor() {
             ("phong wall", phong()),
             ("plastic wall", plastic()),
         ] {
-            expect_material(gpu, &fixture(name, plain("floor"), wall), PHOTONS);
+            expect_material(gpu, &fixture(name, plain("floor"), wall));
         }
         // Normals that fan out: the mirror is a convex one, the diffuse wall is lit as if it were.
         for (name, wall) in [("bent wall", plain("wall")), ("bent mirror", mirror)] {
@@ -146,7 +146,7 @@ fn walls_of_all_kinds_light_the_floor() {
             scene.meshes[1].normals = [0.3, -0.3, -0.3, 0.3]
                 .map(|z| Vec3::new(1.0, 0.0, z).normalize())
                 .to_vec();
-            expect_material(gpu, &scene, PHOTONS);
+            expect_material(gpu, &scene);
         }
     });
 }
@@ -155,7 +155,7 @@ fn walls_of_all_kinds_light_the_floor() {
 fn floors_of_all_kinds_gather() {
     with_gpu(|gpu| {
         let wall = || plain("wall");
-        expect_material(gpu, &fixture("plastic floor", plastic(), wall()), PHOTONS);
+        expect_material(gpu, &fixture("plastic floor", plastic(), wall()));
         let mut scene = fixture("textured floor", plain("floor"), wall());
         let texels = vec![
             [255, 255, 255, 255],
@@ -164,18 +164,18 @@ fn floors_of_all_kinds_gather() {
             [200; 4],
         ];
         scene.materials[0].base_color_texture = texture(&mut scene, texels);
-        expect_material(gpu, &scene, PHOTONS);
+        expect_material(gpu, &scene);
         let mut scene = fixture("bent floor", plain("floor"), wall());
         scene.meshes[0].normals = [0.3, -0.2, -0.3, 0.1]
             .map(|x| Vec3::new(x, 1.0, 0.2).normalize())
             .to_vec();
-        expect_material(gpu, &scene, PHOTONS);
+        expect_material(gpu, &scene);
         // Half of a metal is a diffuse base.
         let half = Material {
             metallic: 0.5,
             ..plastic()
         };
-        expect_material(gpu, &fixture("half metal", half, wall()), PHOTONS);
+        expect_material(gpu, &fixture("half metal", half, wall()));
     });
 }
 
@@ -218,7 +218,7 @@ fn light_goes_through_what_lets_it_through() {
             let mut scene = fixture(name, plain("floor"), wall());
             let index = scene.add_material(material);
             scene.place(cuboid(name, index, low, high));
-            expect_material(gpu, &scene, PHOTONS);
+            expect_material(gpu, &scene);
         }
         for (name, material) in [
             ("thin glass", thin()),
@@ -242,7 +242,7 @@ fn light_goes_through_what_lets_it_through() {
                 mesh.positions.iter_mut().for_each(|p| p.y += 0.1);
             }
             scene.place(mesh);
-            expect_material(gpu, &scene, PHOTONS);
+            expect_material(gpu, &scene);
         }
     });
 }

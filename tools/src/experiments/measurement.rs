@@ -6,19 +6,15 @@
 //! Guarantees: a line that was cut off while it was written is skipped; later lines replace earlier ones of the same key.
 
 use std::collections::BTreeMap;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use clerestory::input::read_file;
-use clerestory::{Error, Result};
+use clerestory::Result;
 use serde_json::Value;
 
 use super::fingerprint;
+use super::json_lines::JsonLines;
 use super::sweep::Budget;
 use super::unbiased::UnbiasedError;
-
-/// Most bytes of a file of measurements.
-const MOST_BYTES: u64 = 1 << 30;
 
 /// One picture's cost and error.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -82,28 +78,21 @@ impl Measurement {
 /// The file of measurements of one experiment.
 #[derive(Debug)]
 pub struct Store {
-    path: PathBuf,
+    file: JsonLines,
     known: BTreeMap<String, Measurement>,
-    /// Whether the file ends within a line.
-    cut_off: bool,
 }
 
 impl Store {
     /// Reads what there is.
     ///
     /// # Errors
-    /// [`Error::Io`] when a file is there and cannot be read.
+    /// As [`JsonLines::open`].
     pub fn open(path: &Path) -> Result<Self> {
-        let text = match read_file(path, MOST_BYTES) {
-            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
-            Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(error),
-        };
-        let lines = text.lines().filter_map(|line| serde_json::from_str(line).ok());
+        let (file, lines) = JsonLines::open(path)?;
+        let known = lines.into_iter().map(|one: Measurement| (one.key.clone(), one));
         Ok(Self {
-            path: path.to_owned(),
-            known: lines.map(|one: Measurement| (one.key.clone(), one)).collect(),
-            cut_off: !text.is_empty() && !text.ends_with('\n'),
+            file,
+            known: known.collect(),
         })
     }
 
@@ -114,25 +103,12 @@ impl Store {
             .filter(|one| fingerprint::kernels_are_current(&one.kernels))
     }
 
-    /// Keeps a measurement, in the file first, and returns it as it will be read back: text may cost a number its last bit, and results
-    /// must not depend on when they were made.
+    /// Keeps a measurement, in the file first, and returns it as it will be read back.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// As [`JsonLines::add`].
     pub fn add(&mut self, measurement: &Measurement) -> Result<Measurement> {
-        let wrong = |error| Error::io(&self.path, error);
-        let line = serde_json::to_string(measurement).map_err(|cause| wrong(cause.into()))?;
-        let read: Measurement = serde_json::from_str(&line).map_err(|cause| wrong(cause.into()))?;
-        let line = if self.cut_off { "\n" } else { "" }.to_owned() + &line + "\n";
-        let mut file = std::fs::OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&self.path)
-            .map_err(wrong)?;
-        file.write_all(line.as_bytes())
-            .and_then(|()| file.sync_data())
-            .map_err(wrong)?;
-        self.cut_off = false;
+        let read = self.file.add(measurement)?;
         self.known.insert(read.key.clone(), read.clone());
         Ok(read)
     }

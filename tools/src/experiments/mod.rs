@@ -10,6 +10,7 @@ pub mod equal_error;
 pub mod findings;
 pub mod fingerprint;
 pub mod jackknife;
+pub mod json_lines;
 pub mod kept_rows;
 pub mod legend;
 pub mod lines;

@@ -36,7 +36,7 @@ const FEW_LIGHTS: usize = 16;
 
 impl LightTreeUse {
     /// Whether there is a tree of so many lights that have a place.
-    pub(super) fn is_for(self, lights: usize) -> bool {
+    pub fn is_for(self, lights: usize) -> bool {
         match self {
             Self::Auto => lights > FEW_LIGHTS,
             Self::On => lights > 0,

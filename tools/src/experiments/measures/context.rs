@@ -108,7 +108,7 @@ impl Context<'_> {
             return self.each(cases, name, rows);
         }
         let device = format!("{}, {}", gpu.caps().device, gpu.caps().driver);
-        let kept = KeptRows::open(self.folder, &device, R::TITLE)?;
+        let mut kept = KeptRows::open(self.folder, &device, R::TITLE)?;
         let placed: Vec<(usize, String, &C)> = cases
             .iter()
             .enumerate()
@@ -124,7 +124,7 @@ impl Context<'_> {
             if self.watch.stopped() {
                 return Ok(measured);
             }
-            kept.add(*place, name, measured)
+            kept.add(*place, name, &measured)
         })
     }
 

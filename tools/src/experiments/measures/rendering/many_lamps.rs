@@ -7,6 +7,7 @@ use clerestory::film::Picture;
 use clerestory::film::metrics::{CompareOptions, compare};
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
+use clerestory::techniques::path::LightTreeUse;
 use clerestory::{Result, scene};
 use serde_json::json;
 
@@ -30,8 +31,8 @@ const POWER: &str = "all by power";
 /// Lamps of smaller halls, and scenes whose lamps are of many triangles.
 const FEW: [u32; 5] = [2, 4, 9, 16, 36];
 const MESHES: [&str; 1] = ["builtin:sphere-light"];
-/// Above so many lights the path tracer takes the tree by itself.
-const AUTO: u64 = 16;
+/// Side of pictures, samples per pixel, and those of references; the same of a smoke run.
+const WORK: [(u32, u32, u32); 2] = [(48, 32, 4096), (8, 4, 16)];
 /// The reference's seed; pictures have those after it.
 const SEED: u32 = 1;
 
@@ -85,7 +86,7 @@ const OF_FEW: &[Criterion<Few>] = &[Criterion::each(
     Bound::AtMost(1.0),
     |row: &Few| (&row.tree_over).into(),
 )
-.among(|row| row.lights > AUTO)];
+.among(|row| LightTreeUse::Auto.is_for(row.lights as usize))];
 
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
@@ -143,9 +144,15 @@ fn render(renderer: &Renderer, side: u32, spp: u32, seed: u32, light_tree: &str)
     Ok((rendered.picture, rendered.report.gpu_seconds))
 }
 
+/// The relative MSE of a picture, its GPU time, s, and their product.
+fn cost((picture, seconds): &(Picture, f64), reference: &Picture) -> Result<[f64; 3]> {
+    let error = compare(picture, reference, &CompareOptions::default())?.relative_mse;
+    Ok([error, *seconds, error * seconds])
+}
+
 /// The ways of a hall.
 fn of_hall(context: &Context<'_>, gpu: &Gpu, (hall, parameters): &(&str, &str)) -> Result<Vec<Row>> {
-    let (side, spp, of_reference) = context.pick((48, 32, 4096), (8, 4, 16));
+    let (side, spp, of_reference) = context.pick(WORK[0], WORK[1]);
     let lamps = context.pick(LAMPS[0], LAMPS[1]);
     let mut renderers = Vec::new();
     let mut references = Vec::new();
@@ -161,9 +168,8 @@ fn of_hall(context: &Context<'_>, gpu: &Gpu, (hall, parameters): &(&str, &str)) 
         let (_, shining, light_tree) = WAYS[i];
         let which = usize::from(shining == "all");
         turns[i] += 1;
-        let (picture, seconds) = render(&renderers[which], side, spp, SEED + turns[i], light_tree)?;
-        let error = compare(&picture, &references[which], &CompareOptions::default())?.relative_mse;
-        Ok([error, seconds, error * seconds])
+        let picture = render(&renderers[which], side, spp, SEED + turns[i], light_tree)?;
+        cost(&picture, &references[which])
     })?;
     let parts: Vec<[Repeats; 3]> = found.iter().map(|turns| Repeats::by_part(turns)).collect();
     let rows = WAYS
@@ -185,17 +191,19 @@ fn of_hall(context: &Context<'_>, gpu: &Gpu, (hall, parameters): &(&str, &str)) 
 
 /// A scene by the tree and by power.
 fn of_few(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Few>> {
-    let (side, spp, of_reference) = context.pick((48, 32, 4096), (8, 4, 16));
+    let (side, spp, of_reference) = context.pick(WORK[0], WORK[1]);
     let renderer = Renderer::new(gpu, &scene::load(address)?)?;
     let reference = render(&renderer, side, of_reference, SEED, "on")?.0;
     let mut seed = SEED;
     let found = context.in_turns(5, 2, |i| {
         seed += 1;
-        let (picture, seconds) = render(&renderer, side, spp, seed, ["on", "off"][i])?;
-        let error = compare(&picture, &reference, &CompareOptions::default())?.relative_mse;
-        Ok(error * seconds)
+        let picture = render(&renderer, side, spp, seed, ["on", "off"][i])?;
+        cost(&picture, &reference)
     })?;
-    let [tree, power] = [0, 1].map(|i| Repeats(found[i].clone()));
+    let [tree, power] = [0, 1].map(|i| {
+        let [_, _, cost] = Repeats::by_part(&found[i]);
+        cost
+    });
     Ok(vec![Few {
         scene: short_name(address).into(),
         lights: renderer.gpu_scene().near_light_count() as u64,
