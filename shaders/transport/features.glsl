@@ -17,7 +17,7 @@ layout(constant_id = 11) const bool HAS_UNLIT = true;
 layout(constant_id = 12) const bool HAS_ENVIRONMENT = true;
 layout(constant_id = 13) const bool HAS_AREA_LIGHTS = true;
 layout(constant_id = 14) const bool HAS_PUNCTUAL_LIGHTS = true;
-layout(constant_id = 15) const uint SAMPLER_KIND = 0;                  // SAMPLER_SOBOL or SAMPLER_PCG
+layout(constant_id = 15) const uint SAMPLER_KIND = 0;                  // SAMPLER_SOBOL, SAMPLER_PCG or SAMPLER_JOINT_SOBOL
 layout(constant_id = 16) const bool WRITE_AOVS = true;
 layout(constant_id = 17) const bool HAS_ALPHA = true;                  // surfaces that are there in part
 layout(constant_id = 24) const bool HAS_PATH_AUTOMATON = false;        // the path set is more than a range of bounces and lobes

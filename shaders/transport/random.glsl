@@ -2,16 +2,21 @@
 //
 // Method: PCG hashes of Jarzynski and Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020); shuffled and Owen-scrambled
 // Sobol' (0,2)-sequence padded by slots of two dimensions, Burley, "Practical Hash-based Owen Scrambling" (JCGT 10(4), 2020),
-// with the hash constants of Vegdahl (2021).
+// with the hash constants of Vegdahl (2021). Jointly stratified, the first slots of a stream are pairs of one sequence of sixteen dimensions.
 // Guarantees: a draw is a pure function of (seed, pixel, sample_index, dimension); values lie on the 2^-24 grid of [0, 1).
 // Expects: `CLERESTORY_SAMPLER`, a uint constant (specialization constant or macro), declared before the inclusion.
 #ifndef CLERESTORY_TRANSPORT_RANDOM_GLSL
 #define CLERESTORY_TRANSPORT_RANDOM_GLSL
 
+#include "transport/sobol.glsl"
+
 const uint SAMPLER_SOBOL = 0u;
 const uint SAMPLER_PCG = 1u;
+const uint SAMPLER_JOINT_SOBOL = 2u;
 // Stands for the sample index in the key of a scrambled sequence, which is the same for all samples of a pixel.
 const uint SEQUENCE_KEY = 0x9e3779b9u;
+// Stands for the slot in the key by which the points of a joint sequence are shuffled, which is the same for all slots.
+const uint JOINT_KEY = 0x85ebca6bu;
 const float UNIT_PER_BITS24 = 1.0 / 16777216.0;
 
 // One stream of random numbers. `dimension` counts slots: each call of sample_1d or sample_2d uses one.
@@ -75,9 +80,21 @@ uint sobol_pascal(uint index) {
     return index;
 }
 
+// The two random words of one of the first SOBOL_PAIRS slots of a joint sequence. Runs of 2^SOBOL_INDEX_BITS samples are scrambled each by itself.
+uvec2 joint_sobol_bits(Sampler s) {
+    uint run = SEQUENCE_KEY + (s.sample_index >> SOBOL_INDEX_BITS);
+    uint index = owen_scramble(s.sample_index, pcg4d(uvec4(s.pixel, run, JOINT_KEY, s.seed)).x);
+    uvec4 key = pcg4d(uvec4(s.pixel, run, s.dimension, s.seed));
+    uvec2 point = sobol_pair(index, s.dimension);
+    return uvec2(owen_scramble(point.x, key.y), owen_scramble(point.y, key.z));
+}
+
 // The two random words of a slot.
 uvec2 sampler_bits(Sampler s) {
-    const bool sobol = CLERESTORY_SAMPLER == SAMPLER_SOBOL;
+    if (CLERESTORY_SAMPLER == SAMPLER_JOINT_SOBOL && s.dimension < SOBOL_PAIRS) {
+        return joint_sobol_bits(s);
+    }
+    const bool sobol = CLERESTORY_SAMPLER != SAMPLER_PCG;
     uvec4 key = pcg4d(uvec4(s.pixel, sobol ? SEQUENCE_KEY : s.sample_index, s.dimension, s.seed));
     if (!sobol) {
         return key.xy;

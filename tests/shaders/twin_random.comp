@@ -5,7 +5,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL or SAMPLER_PCG
+layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL, SAMPLER_PCG or SAMPLER_JOINT_SOBOL
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 
 #include "transport/random.glsl"

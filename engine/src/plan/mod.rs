@@ -18,10 +18,11 @@
 //!   it comes last, and [`Candidate::misses`] and [`Plan::shortfall`] name the lights.
 //!
 //! The predicted error is √(bias² + noise²), with an interval for 9 of 10 pictures ([`Candidate::error_interval`]). Pilots take one first round of each
-//! candidate with the compilation of its kernels, and then two seconds, or a quarter of all predicted time where that is above five seconds; first rounds
-//! of further settings of a technique are left out where they would exceed it, those of further techniques only where a time is to be kept.
-//! [`Plan::pilot_share`] says what share they took. What they find is the same in every run for as many rounds; how many there are, and what is predicted to be
-//! faster, is the clock's.
+//! candidate with the compilation of its kernels, and then two seconds, or a quarter of all time where that may be above five seconds, by the least
+//! that the picture may take for all that is known, and a last pair of at least a sixteenth of the picture's samples, up to 16; where that pair says that
+//! the picture takes far longer, a longer one follows. First rounds of further settings of a technique are left out where they would exceed it, those of
+//! further techniques only where a time is to be kept. [`Plan::pilot_share`] says what share they took. What they find is the same in every run for as
+//! many rounds; how many there are, and what is predicted to be faster, is the clock's.
 //!
 //! Adaptive samples are taken where the settings ask for them: pilots have them too, so that noise and cost are those of such pictures. Rounds with fewer samples
 //! than the law of their error holds from ([`Law`](crate::techniques::Law)) tell it only where there are no others; the last pair has as many as that where rounds had,
@@ -258,7 +259,7 @@ pub fn plan_among(
         if asked.proceeds() {
             let rounds = seconds_of_rounds(&trials);
             if let Some(trial) = &mut trials[chosen] {
-                run_last_pair(trial, &asked, start.elapsed().as_secs_f64(), rounds)?;
+                run_last_pair(trial, &asked, start, rounds)?;
             }
         }
         // One whose last pair fails is out.
@@ -407,6 +408,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/plan/noise.rs::pairs_know_their_error",
         "engine/src/plan/noise.rs::a_bright_square_does_not_hide_the_noise_of_dark_pixels",
+        "engine/src/plan/noise.rs::bright_dots_are_related_to_their_own_radiance",
+        "engine/src/plan/noise.rs::one_pixel_that_the_others_have_missed_is_not_all_of_the_error",
         "engine/src/plan/noise.rs::pairs_of_one_view_keep_the_ratio_of_their_errors",
         "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",
         "engine/src/plan/model.rs::slopes_are_believed_alike_to_either_side_of_the_law",

@@ -159,13 +159,22 @@ impl ErrorModel {
     /// Factor that the root of the relative MSE keeps within to either side in 9 of 10 cases, by how well level, truth and slope are known and by the spread of
     /// the picture itself, which has `pixels` times as many pixels as what was measured.
     pub fn factor(&self, samples: f64, pixels: f64) -> f64 {
+        (NINE_OF_TEN * 0.5 * self.deviation(samples, pixels)).exp()
+    }
+
+    /// Standard deviation of the logarithm of the relative MSE of such a picture about what is expected of it.
+    fn deviation(&self, samples: f64, pixels: f64) -> f64 {
         let Some(anchor) = self.anchor() else {
             return f64::INFINITY;
         };
         let by_slope = self.slope_and_deviation().1 * (samples / anchor.samples).ln();
         let by_level = anchor.deviation.powi(2) * (1.0 + 1.0 / pixels.max(1.0)) + TRUTH_DEVIATION * TRUTH_DEVIATION;
-        let variance = by_level + by_slope * by_slope;
-        (NINE_OF_TEN * 0.5 * variance.sqrt()).exp()
+        (by_level + by_slope * by_slope).sqrt()
+    }
+
+    /// Factor that the samples for an error, `samples` as far as is known, keep within to either side in 9 of 10 cases.
+    pub fn factor_of_samples(&self, samples: f64) -> f64 {
+        (NINE_OF_TEN * self.deviation(samples, 1.0) / self.slope()).exp()
     }
 
     /// Least number of samples per pixel for that relative MSE, at least 1 and at most `u32::MAX`.

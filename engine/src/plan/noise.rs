@@ -3,18 +3,30 @@
 //! Half the squared difference of two independent, equally distributed pixels is an unbiased estimate of their variance, whatever the
 //! samples within each are like (stratified samples of one pixel are not independent, so their own spread says nothing). The relative
 //! error also needs the true radiance, which each pair has from the other pairs of its view, since chance that makes a pixel's difference large
-//! makes its own product small: the product of their two means is unbiased for its square. Where noise hides a pixel, that square is taken
-//! from its neighbourhood, by the median of the means over nine blocks: what is bright in fewer than five of them, such as a lamp, does not hide the
-//! relative noise of what is dark around it.
+//! makes its own product small. Each pixel is drawn toward the mean around it by as much as noise outweighs what really differs there, which the two
+//! halves of those pairs tell apart: what both see is there, however small and bright; what one sees is noise. A pixel that is darker in them than its
+//! neighbours, but differs by more in the pair itself than in them, has light that they have missed: it is drawn toward the mean by that noise. The few
+//! greatest terms count as the next one, unless the radiance of all pairs together bears them out: one pixel that the others know nothing of, such as the edge
+//! of a small lamp, would else be all of the error.
 //!
-//! Errors of a third per pixel are found to 10 % by four pairs on 96² pixels or more. On 32² pixels, where the widest neighbourhood is most of the
-//! picture, they are up to 15 % off, and by a single pair, which has no other, up to a third too low.
+//! A lone pair has itself alone: the product of both pictures is unbiased for the square of the radiance, and where noise hides a pixel, that square is
+//! taken from its neighbourhood, by the median of the means over nine blocks: what is bright in fewer than five of them, such as a lamp, does not hide
+//! the relative noise of what is dark around it.
+//!
+//! Errors of a third per pixel are found to 10 % by four pairs on 96² pixels or more. On 32² pixels they are up to 15 % off, and by a lone pair up to
+//! a third too low.
 
 use super::tiles::Tiles;
 use crate::film::metrics::{relative_mse_epsilon, relative_square};
 use crate::film::picture::{Picture, VARIANCE};
 use crate::{Error, Result};
 
+/// Pixels to each side of the square whose mean a pixel of other pairs is drawn to.
+const SHRINK_REACH: usize = 2;
+/// Rank of the term that those above it count as, where nothing bears them out.
+const BOUND_RANK: usize = 3;
+/// Relative standard error of a pair's relative MSE by what the others do not know of the truth, for each unit of the relative MSE of their mean.
+const UNKNOWN_TRUTH: f64 = 0.1;
 /// Pixels to each side of a block of the widest neighbourhood, and from the middle of one to that of the next: nine lie in a square of 19 × 19 pixels.
 const BLOCK_REACH: usize = 3;
 const BLOCK_STEP: usize = 6;
@@ -26,7 +38,7 @@ const TRUST: f64 = 0.05;
 /// How the square of a pixel's true radiance is found.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Truth {
-    /// From its neighbourhood where noise hides it: whatever is bright in one picture alone is rare light that pixels around may get, too.
+    /// Its neighbourhood counts where noise hides it: whatever is bright in one picture alone is rare light that pixels around may get, too.
     Neighbourhood,
     /// No less than the square of both pictures' mean: what is bright in one picture alone belongs to the pixel. So it is where light that
     /// is scattered diffusely comes from kernels, and only what the eye sees by way of mirrors is sampled. Neighbouring pixels share their noise.
@@ -60,7 +72,7 @@ pub fn relative_mse_of_pair(a: &Picture, b: &Picture, offset: f64) -> Result<f64
     Ok(found.first().map_or(0.0, |found| found.relative_mse))
 }
 
-/// As [`relative_mse_of_pair`], of each of several pairs of one technique and view, all relative to the truth that they show together.
+/// As [`relative_mse_of_pair`], of each of several pairs of one technique and view, each relative to the truth that the others show.
 pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Result<Vec<NoiseEstimate>> {
     let Some((_, [first, _])) = pairs.first() else {
         return Ok(Vec::new());
@@ -75,19 +87,39 @@ pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Re
     let all = means_of_halves(pairs, pixels)?;
     let epsilon = relative_mse_epsilon(all.iter().flatten().flatten().map(|value| *value as f32), offset);
     // One truth for all, or one of the others for each.
-    let shared = (kind == Truth::Pixel || pairs.len() == 1).then(|| levels(&all, width, kind));
+    let shared = (kind == Truth::Pixel || pairs.len() == 1).then(|| levels_of_pair(&all, width, kind));
     let estimate = |at: usize| -> Result<NoiseEstimate> {
-        let (_, pair) = pairs[at];
+        let (spp, pair) = pairs[at];
         if let Some(levels) = &shared {
-            return noise_of_pair(pair, levels, epsilon, kind);
+            return noise_of_pair(pair, levels, None, epsilon, kind);
         }
         let others = [&pairs[..at], &pairs[at + 1..]].concat();
-        noise_of_pair(
-            pair,
-            &levels(&means_of_halves(&others, pixels)?, width, kind),
-            epsilon,
-            kind,
-        )
+        let of_others: f64 = others.iter().map(|(spp, _)| f64::from(*spp)).sum();
+        let (halves, own) = (
+            means_of_halves(&others, pixels)?,
+            means_of_halves(&pairs[at..=at], pixels)?,
+        );
+        let levels: Vec<_> = halves
+            .iter()
+            .zip(&own)
+            .map(|(others, own)| shrunk(others, own, f64::from(spp) / of_others, width))
+            .collect();
+        let borne_out: Vec<Vec<f64>> = levels
+            .iter()
+            .zip(&all)
+            .map(|(levels, [a, b])| {
+                let means = a.iter().zip(b).map(|(a, b)| 0.5 * (a + b));
+                levels.iter().zip(means).map(|(level, mean)| level.max(mean)).collect()
+            })
+            .collect();
+        let found = noise_of_pair(pair, &levels, Some(&borne_out), epsilon, kind)?;
+        // Of the mean of both halves of the others, as independent samples have it.
+        let noise_of_others = found.relative_mse * f64::from(spp) / (2.0 * of_others);
+        let by_truth = UNKNOWN_TRUTH * noise_of_others * found.relative_mse;
+        Ok(NoiseEstimate {
+            deviation: found.deviation.hypot(by_truth),
+            ..found
+        })
     };
     (0..pairs.len()).map(estimate).collect()
 }
@@ -97,8 +129,8 @@ fn means_of_halves(pairs: &[Pair<'_>], pixels: usize) -> Result<Vec<[Vec<f64>; 2
     (0..3).map(|channel| pooled(pairs, channel, pixels)).collect()
 }
 
-/// Of each channel: the true radiance of each pixel, as far as the means of both halves know it.
-fn levels(halves: &[[Vec<f64>; 2]], width: usize, kind: Truth) -> Vec<Vec<f64>> {
+/// Of each channel: the true radiance of each pixel, as far as a pair knows it whose own noise is related to it.
+fn levels_of_pair(halves: &[[Vec<f64>; 2]], width: usize, kind: Truth) -> Vec<Vec<f64>> {
     let of_channel = |[a, b]: &[Vec<f64>; 2]| {
         let mut truth = truth(a, b, width, TRUST);
         if kind == Truth::Pixel {
@@ -111,31 +143,46 @@ fn levels(halves: &[[Vec<f64>; 2]], width: usize, kind: Truth) -> Vec<Vec<f64>> 
     halves.iter().map(of_channel).collect()
 }
 
-/// The relative MSE of either picture of a pair, relative to the true radiance by channel and pixel. Pixels that are not finite are left out.
-fn noise_of_pair([a, b]: [&Picture; 2], levels: &[Vec<f64>], epsilon: f64, kind: Truth) -> Result<NoiseEstimate> {
+/// The relative MSE of either picture of a pair, relative to the true radiance by channel and pixel. Pixels that are not finite are left out. The greatest
+/// terms are bounded where other levels are given that they would have to be borne out by.
+fn noise_of_pair(
+    [a, b]: [&Picture; 2],
+    levels: &[Vec<f64>],
+    borne_out: Option<&[Vec<f64>]>,
+    epsilon: f64,
+    kind: Truth,
+) -> Result<NoiseEstimate> {
     let (width, height) = (a.width() as usize, a.height() as usize);
     let (a, b) = (a.main_layer()?.values(), b.main_layer()?.values());
+    let term = |pixel: usize, levels: &[Vec<f64>]| {
+        levels.iter().enumerate().try_fold(0.0, |sum, (channel, levels)| {
+            let (a, b) = finite(a[pixel * 3 + channel], b[pixel * 3 + channel])?;
+            Some(sum + relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon))
+        })
+    };
+    let mut terms: Vec<(usize, f64)> = (0..width * height)
+        .filter_map(|pixel| Some((pixel, term(pixel, levels)?)))
+        .collect();
+    if let Some(borne_out) = borne_out {
+        let mut sorted: Vec<f64> = terms.iter().map(|(_, term)| *term).collect();
+        sorted.sort_by(|a, b| b.total_cmp(a));
+        let bound = sorted.get(BOUND_RANK - 1).copied().unwrap_or(f64::INFINITY);
+        for (pixel, value) in terms.iter_mut().filter(|(_, term)| *term > bound) {
+            *value = term(*pixel, borne_out).unwrap_or(0.0).max(bound);
+        }
+    }
     let mut tiles = Tiles::new(width, height);
     let mut squares = 0.0_f64;
-    let mut measured = 0_usize;
-    for pixel in 0..width * height {
-        let mut of_pixel = Some(0.0_f64);
-        for (channel, levels) in levels.iter().enumerate() {
-            let both = finite(a[pixel * 3 + channel], b[pixel * 3 + channel]);
-            let square = both.map(|(a, b)| relative_square((a - b) * (a - b) / 2.0, levels[pixel], epsilon));
-            of_pixel = of_pixel.zip(square).map(|(sum, square)| sum + square);
-        }
-        let Some(of_pixel) = of_pixel else { continue };
-        measured += 1;
-        squares += of_pixel * of_pixel;
-        tiles.add(pixel, of_pixel / 3.0);
+    for (pixel, term) in &terms {
+        squares += term * term;
+        tiles.add(*pixel, term / 3.0);
     }
     let (relative_mse, by_tiles) = tiles.mean();
     Ok(NoiseEstimate {
         relative_mse,
         deviation: match kind {
             // Var x ≤ E x² for each pixel, whose channels count as one.
-            Truth::Neighbourhood => squares.sqrt() / (3 * measured.max(1)) as f64,
+            Truth::Neighbourhood => squares.sqrt() / (3 * terms.len().max(1)) as f64,
             Truth::Pixel => by_tiles,
         },
     })
@@ -185,6 +232,32 @@ pub(super) fn truth_of_pair(a: &Picture, b: &Picture, channel: usize, trust: f64
     let pixels = a.width() as usize * a.height() as usize;
     let [first, second] = pooled(&[(1, [a, b])], channel, pixels)?;
     Ok(truth(&first, &second, a.width() as usize, trust))
+}
+
+/// Of each pixel of a channel: its true radiance by two halves of `others` that have no noise in common with the pair `own`, which has `share` of their
+/// samples. The local linear estimate of least squared error (Lee 1980, "Digital image enhancement and noise filtering by use of local statistics"):
+/// the covariance of both halves around the pixel is the variance of the truth, half their squared difference that of either half. Where the pair shows
+/// more noise than they do, that counts, if it makes the pixel brighter: what is rare is seldom seen by them, and then dark.
+fn shrunk([a, b]: &[Vec<f64>; 2], own: &[Vec<f64>; 2], share: f64, width: usize) -> Vec<f64> {
+    let of_both = |of: fn(f64, f64) -> f64| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| of(*a, *b)).collect() };
+    let near = |values: &[f64]| blurred(values, width, SHRINK_REACH);
+    let (near_a, near_b) = (near(a), near(b));
+    let (products, squares) = (near(&of_both(|a, b| a * b)), near(&of_both(|a, b| (a - b) * (a - b))));
+    (0..a.len())
+        .map(|i| {
+            let (mean, around) = (0.5 * (a[i] + b[i]), 0.5 * (near_a[i] + near_b[i]));
+            let truth = (products[i] - near_a[i] * near_b[i]).max(0.0);
+            let drawn_by = |noise: f64| {
+                let belief = if noise > 0.0 { truth / (truth + noise) } else { 1.0 };
+                around + belief * (mean - around)
+            };
+            // Variances of the mean of both halves.
+            let noise = 0.25 * squares[i];
+            let difference = own[0][i] - own[1][i];
+            let noise_of_own = 0.25 * share * difference * difference;
+            drawn_by(noise).max(drawn_by(noise.max(noise_of_own)))
+        })
+        .collect()
 }
 
 /// As [`truth_of_pair`], of values.
@@ -373,6 +446,75 @@ mod tests {
             let ratio = (found / 8.0 / expected).sqrt();
             assert!((0.85..1.15).contains(&ratio), "{side}, {samples}: {ratio}");
         }
+    }
+
+    /// A dark room of 64 × 64 pixels with bright dots of one pixel, one in 16, whose light is met by one sample in four.
+    fn with_dots(samples: u32, random: &mut Random) -> Picture {
+        let values = (0..64 * 64 * 3).map(|i| {
+            let (x, y) = (i / 3 % 64, i / 3 / 64);
+            let is_dot = x % 4 == 0 && y % 4 == 0;
+            let mean = |random: &mut Random, of: fn(f32) -> f32| {
+                (0..samples).map(|_| of(random.unit())).sum::<f32>() / samples as f32
+            };
+            if is_dot {
+                2.0 * mean(random, |unit| if unit < 0.25 { 4.0 } else { 0.0 })
+            } else {
+                0.1 * mean(random, |unit| 2.0 * unit)
+            }
+        });
+        Picture::from_radiance(64, 64, values.collect()).unwrap()
+    }
+
+    // The truth of dots that noise hides is theirs, not that of the dark around them: with that the root was found 1.4 times as large.
+    #[test]
+    fn bright_dots_are_related_to_their_own_radiance() {
+        let mut random = Random(29);
+        let budgets = [4, 16, 64];
+        let pictures = budgets.map(|samples| [(); 2].map(|()| with_dots(samples, &mut random)));
+        let pairs: Vec<Pair<'_>> = pictures
+            .iter()
+            .zip(budgets)
+            .map(|([a, b], spp)| (spp, [a, b]))
+            .collect();
+        let found = noise_of_pairs(&pairs, 0.01, Truth::Neighbourhood).unwrap();
+        let mean = (2.0 + 15.0 * 0.1) / 16.0;
+        // Relative variances of a sample: 3 of a dot, a third elsewhere.
+        let term = |radiance: f64, variance: f64| {
+            let square = radiance * radiance;
+            variance * square / (square + 0.01 * mean * mean)
+        };
+        let of_sample = (term(2.0, 3.0) + 15.0 * term(0.1, 1.0 / 3.0)) / 16.0;
+        for (found, spp) in found.iter().zip(budgets) {
+            let ratio = (found.relative_mse / of_sample * f64::from(spp)).sqrt();
+            assert!((0.85..1.15).contains(&ratio), "{spp}: {ratio}");
+        }
+    }
+
+    // Of a dot that one sample in 300 meets, a thousand times as bright as what is around it, the pairs of few samples show nothing: relative to what they show
+    // its noise in the last one was a thousand times all other.
+    #[test]
+    fn one_pixel_that_the_others_have_missed_is_not_all_of_the_error() {
+        let mut random = Random(31);
+        let budgets = [4, 64];
+        let pictures = budgets.map(|samples| {
+            [0, 1].map(|which| {
+                let values = (0..64 * 64 * 3).map(|i| {
+                    let sum: f32 = (0..samples).map(|_| 2.0 * random.unit()).sum();
+                    let is_met = i / 3 == 2000 && samples == 64 && which == 0;
+                    sum / samples as f32 + if is_met { 300.0 } else { 0.0 }
+                });
+                Picture::from_radiance(64, 64, values.collect()).unwrap()
+            })
+        });
+        let pairs: Vec<Pair<'_>> = pictures
+            .iter()
+            .zip(budgets)
+            .map(|([a, b], spp)| (spp, [a, b]))
+            .collect();
+        let found = noise_of_pairs(&pairs, 0.01, Truth::Neighbourhood).unwrap()[1].relative_mse;
+        // A third of a sample's square, by 64; the dot is worth 8 at most of 4096.
+        let (without, dot) = (1.0 / 3.0 / 64.0, 8.0 / 4096.0);
+        assert!((0.9 * without..1.1 * without + dot).contains(&found), "{found}");
     }
 
     // One truth for all pairs: their errors stand to each other as their samples do, whatever is not known of the truth.

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::Goal;
 use super::judgement::{judgements, reference_trial};
-use super::trial::{Asked, ROUNDS, Trial};
+use super::trial::{Asked, LAST_PAIRS, ROUNDS, Trial};
 use crate::Result;
 use crate::techniques::Bias;
 
@@ -20,6 +20,11 @@ const ROUNDS_SHARE: f64 = 0.6;
 const LONG: f64 = 5.0;
 /// Most samples per pixel of the last pair: with more, the error of the slope outweighs that of the pair, which would only take longer.
 const LAST_PAIR: u32 = 4 * ROUNDS[ROUNDS.len() - 1];
+/// Samples per pixel that the last pair has where the picture has so many times as many: both of it take an eighth of the picture's time.
+const LEAST_LAST_PAIR: u32 = ROUNDS[1];
+const PICTURE_OVER_PILOT: u32 = 16;
+/// A longer last pair has at least so many times the samples of the one before.
+const LONGER: u32 = 4;
 /// Beyond the relative MSE of what has met light.
 const UNLIT_COST: f64 = f64::MAX;
 /// Beyond every other cost: of what cannot be chosen.
@@ -29,12 +34,15 @@ const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
 const HOPELESS: f64 = 2.0;
 
-/// Seconds that pilots may still take, of `part` of what they may take in all, beside a picture that takes `picture` seconds: `spent` seconds have gone by, and
-/// `rounds` of them were taken by rounds.
-fn room(part: f64, goal: Goal, picture: f64, spent: f64, rounds: f64) -> f64 {
+/// Seconds that pilots may still take, of `part` of what they may take in all, beside a picture that takes between `least` and `most` seconds: `spent`
+/// seconds have gone by, and `rounds` of them were taken by rounds.
+fn room(part: f64, goal: Goal, [least, most]: [f64; 2], spent: f64, rounds: f64) -> f64 {
     match goal.time {
         Some(time) => part * PILOT_SHARE * time.as_secs_f64() - spent,
-        None if picture + FREE_SECONDS > LONG => part * PILOT_SHARE / (1.0 - PILOT_SHARE) * picture - spent,
+        // Whatever the picture takes, pilots are within their share, or both are not long.
+        None if most + FREE_SECONDS > LONG => {
+            part * (PILOT_SHARE / (1.0 - PILOT_SHARE) * least).max(PILOT_SHARE * LONG) - spent
+        }
         None => part * FREE_SECONDS - rounds,
     }
 }
@@ -44,30 +52,48 @@ pub fn is_late(trials: &[Option<Trial<'_>>], goal: Goal, spent: f64) -> bool {
     if let Some(time) = goal.time {
         return spent > ROUNDS_SHARE * PILOT_SHARE * time.as_secs_f64();
     }
-    let predicted = |trial: &Trial<'_>| trial.cost.seconds(f64::from(trial.samples(goal, spent)));
-    let picture = trials.iter().flatten().map(predicted).fold(f64::INFINITY, f64::min);
+    let least = |trial: &Trial<'_>| trial.picture_seconds(goal, spent)[0];
+    let picture = trials.iter().flatten().map(least).fold(f64::INFINITY, f64::min);
     let all = picture + spent;
     all.is_finite() && all > LONG && spent > PILOT_SHARE * all
 }
 
-/// Renders the last pair of the chosen one: as many samples as there is time for, and no more than the picture needs. None is rendered where its pilots have
-/// met no light, or where the time to keep leaves no room.
-pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, spent: f64, rounds: f64) -> Result<()> {
-    let wanted = trial.samples(asked.goal, spent);
-    let picture = trial.cost.seconds(f64::from(wanted));
-    let fits = trial.pair_samples(room(1.0, asked.goal, picture, spent, rounds));
-    let least = least_of_last_pair(trial.law.samples_least, trial.spp, wanted);
-    if !trial.lit || asked.goal.time.is_some() && fits < least {
-        return Ok(());
+/// Renders the last pair of the chosen one: as many samples as there is time for, and no more than the picture needs. Where it says that the picture takes
+/// far longer than it seemed to, a longer one follows. None is rendered where pilots have met no light, or where the time to keep leaves no room.
+pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, start: Instant, rounds: f64) -> Result<()> {
+    let rounds_before = rounds - trial.all_seconds;
+    for _ in 0..LAST_PAIRS {
+        let spent = start.elapsed().as_secs_f64();
+        let wanted = trial.samples(asked.goal, spent);
+        let picture = trial.picture_seconds(asked.goal, spent);
+        let room = room(1.0, asked.goal, picture, spent, rounds_before + trial.all_seconds);
+        let fits = trial.pair_samples(room).min(wanted).min(LAST_PAIR);
+        let spp = match trial.last_spp() {
+            0 => {
+                let least = least_of_last_pair(trial.law.samples_least, trial.spp, wanted);
+                if !trial.lit || asked.goal.time.is_some() && fits < least {
+                    return Ok(());
+                }
+                fits.max(least)
+            }
+            before if fits >= LONGER * before && asked.proceeds() => fits,
+            _ => return Ok(()),
+        };
+        trial.conclude(asked, spp)?;
+        if !trial.can_be_chosen() {
+            return Ok(());
+        }
     }
-    trial.conclude(asked, fits.min(wanted).clamp(least, LAST_PAIR))
+    Ok(())
 }
 
 /// Fewest samples per pixel of the last pair of a picture of `wanted`: as many as the error's law holds from, but no more than the picture has, nor than
-/// those of the last round, after which there may be no time for more; and as many as the first round had.
+/// those of the last round, after which there may be no time for more; as many as the first round had, and as the second one where that is little
+/// beside the picture.
 fn least_of_last_pair(samples_least: u32, last_round_spp: u32, wanted: u32) -> u32 {
     let least = samples_least.min(last_round_spp).min(wanted);
-    least.clamp(ROUNDS[0], LAST_PAIR)
+    let little = (wanted / PICTURE_OVER_PILOT).min(LEAST_LAST_PAIR);
+    least.max(little).clamp(ROUNDS[0], LAST_PAIR)
 }
 
 /// Further rounds for what can still be chosen, and for what that is held against, as long as they cost little beside the picture itself. Every trial is
@@ -93,7 +119,8 @@ pub fn run_rounds(
         };
         let able = || trials.iter().flatten().filter(|trial| trial.can_be_chosen());
         let best = able().map(&cost).fold(f64::INFINITY, f64::min);
-        let picture = able().map(predicted).fold(f64::INFINITY, f64::min);
+        let picture = able().map(|trial| trial.picture_seconds(goal, spent));
+        let picture = picture.fold([f64::INFINITY; 2], |[a, b], [least, most]| [a.min(least), b.min(most)]);
         let rounds = seconds_of_rounds(trials);
         let allowed = room(ROUNDS_SHARE, goal, picture, spent, rounds);
         let blind = goal.time.is_none() && trials.iter().flatten().all(|trial| !trial.lit);
@@ -167,13 +194,14 @@ mod tests {
     #[test]
     fn the_last_pair_is_under_the_law_of_the_picture() {
         let of = least_of_last_pair;
-        assert_eq!([of(1, 4, 1), of(1, 256, 1000)], [ROUNDS[0]; 2]);
+        assert_eq!([of(1, 4, 1), of(1, 256, 79)], [ROUNDS[0]; 2]);
+        assert_eq!([of(1, 4, 160), of(1, 256, 1000)], [10, LEAST_LAST_PAIR]);
         assert_eq!(
             [of(16, 64, 1), of(16, 64, 10), of(16, 16, 16), of(16, 256, 1000)],
             [4, 10, 16, 16]
         );
-        // Where rounds had no time for as many, the last pair has none, either.
-        assert_eq!(of(16, 4, 1000), ROUNDS[0]);
+        // Where rounds had no time for as many, the last pair has none, either, unless the picture takes far longer.
+        assert_eq!([of(64, 4, 70), of(64, 4, 1000)], [ROUNDS[0], LEAST_LAST_PAIR]);
         assert_eq!(of(1 << 20, 1 << 20, 1 << 20), LAST_PAIR);
     }
 
@@ -184,17 +212,21 @@ mod tests {
             time: None,
         };
         // A picture of 30 s: ten of pilots make a quarter of all, six of them rounds.
-        assert!((room(1.0, free, 30.0, 0.0, 0.0) - 10.0).abs() < 1e-12);
-        assert!((room(ROUNDS_SHARE, free, 30.0, 4.0, 1.0) - 2.0).abs() < 1e-12);
-        // Just long: compilation and whatever else was spent counts.
-        assert!((room(1.0, free, 3.1, 0.5, 0.1) - (3.1 / 3.0 - 0.5)).abs() < 1e-12);
+        assert!((room(1.0, free, [30.0; 2], 0.0, 0.0) - 10.0).abs() < 1e-12);
+        assert!((room(ROUNDS_SHARE, free, [30.0; 2], 4.0, 1.0) - 2.0).abs() < 1e-12);
+        // Of what is not well known the least counts.
+        assert!((room(1.0, free, [12.0, 40.0], 1.0, 0.5) - 3.0).abs() < 1e-12);
+        // Maybe long: whatever else was spent counts, and with a picture that makes five seconds of both they are a quarter.
+        for picture in [[3.1; 2], [0.5, 20.0]] {
+            assert!((room(1.0, free, picture, 0.5, 0.1) - (1.25 - 0.5)).abs() < 1e-12);
+        }
         // Short: seconds of rounds alone.
-        assert!((room(1.0, free, 0.1, 5.0, 0.5) - 1.5).abs() < 1e-12);
+        assert!((room(1.0, free, [0.1; 2], 5.0, 0.5) - 1.5).abs() < 1e-12);
         let timed = Goal {
             error: None,
             time: Some(Duration::from_secs(8)),
         };
-        assert!((room(1.0, timed, 6.0, 0.5, 0.1) - 1.5).abs() < 1e-12);
+        assert!((room(1.0, timed, [6.0; 2], 0.5, 0.1) - 1.5).abs() < 1e-12);
         // Before any candidate has been tried nothing is late but a time.
         assert!(!is_late(&[], free, 100.0) && is_late(&[], timed, 2.0));
     }

@@ -35,8 +35,10 @@ const LEAST_PATIENCE: Duration = Duration::from_secs(10);
 const SMALL: u32 = 4;
 /// Distance of the pilots' seeds from the picture's and from each other.
 const SEED_STEP: u32 = 0x9E37_79B9;
-/// Pairs of seeds of a candidate: for first samples, rounds and the last pair.
-const SEED_PAIRS: u32 = ROUNDS.len() as u32 + 2;
+/// Last pairs at most, each longer than the one before, which then tells how fast the error falls.
+pub const LAST_PAIRS: u32 = 3;
+/// Pairs of seeds of a candidate: for first samples, rounds and last pairs.
+const SEED_PAIRS: u32 = ROUNDS.len() as u32 + 1 + LAST_PAIRS;
 
 /// The two pilots' pictures of a round.
 pub struct Stage {
@@ -65,8 +67,10 @@ pub struct Trial<'a> {
     size: [u32; 2],
     /// Which of all candidates, for seeds of its own.
     index: u32,
-    /// Samples per pixel of the last pair, which nothing was decided by; 0 without.
-    last_spp: u32,
+    /// The last pair, which nothing was decided by but whether to have a longer one.
+    last: Option<Stage>,
+    /// How many of them there were.
+    last_pairs: u32,
     pub error: ErrorModel,
     pub cost: CostModel,
     /// Share of a pilot sample's time that does not depend on the number of pixels.
@@ -173,7 +177,8 @@ impl<'a> Trial<'a> {
             settings,
             size,
             index: index as u32,
-            last_spp: 0,
+            last: None,
+            last_pairs: 0,
             error: ErrorModel::falling(law.slope),
             law,
             cost: CostModel::default(),
@@ -302,19 +307,22 @@ impl<'a> Trial<'a> {
         }
         self.stages.push(Stage { spp, pictures });
         self.spp = spp;
-        self.measure(None)?;
+        self.measure()?;
         Ok(true)
     }
 
     /// The last pair, of `spp` samples per pixel: from now on it alone says how large the error is. What keeps it from that is
-    /// [`failure`](Self::failure); where it is given up, what the rounds have found stands.
+    /// [`failure`](Self::failure); where it is given up, what was found before stands.
     pub fn conclude(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
-        let concluded = self.pair(asked, spp, SEED_PAIRS - 1).and_then(|pictures| {
+        let seeds = SEED_PAIRS - LAST_PAIRS + self.last_pairs;
+        let concluded = self.pair(asked, spp, seeds).and_then(|pictures| {
             let Some(pictures) = pictures else {
                 return Ok(());
             };
-            self.last_spp = spp;
-            self.measure(Some(&Stage { spp, pictures }))
+            self.last_pairs += 1;
+            let before = self.last.replace(Stage { spp, pictures });
+            self.stages.extend(before);
+            self.measure()
         });
         if let Err(error) = concluded {
             self.failure = reason_of(error)?;
@@ -322,8 +330,14 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
+    /// Samples per pixel of the last pair; 0 without.
+    pub fn last_spp(&self) -> u32 {
+        self.last.as_ref().map_or(0, |last| last.spp)
+    }
+
     /// The errors of all pairs, relative to what they show together.
-    fn measure(&mut self, last: Option<&Stage>) -> Result<()> {
+    fn measure(&mut self) -> Result<()> {
+        let last = self.last.as_ref();
         let kind = if self.law.shares_noise {
             Truth::Pixel
         } else {
@@ -388,6 +402,16 @@ impl<'a> Trial<'a> {
         (1.0 + left / each).min(f64::from(u32::MAX)) as u32
     }
 
+    /// Seconds between which the picture for the goal takes in 9 of 10 cases, by how well its error is known, when the pilots have taken `spent` seconds.
+    pub fn picture_seconds(&self, goal: Goal, spent: f64) -> [f64; 2] {
+        let samples = f64::from(self.samples(goal, spent));
+        let slack = match goal.error {
+            Some(_) if self.lit => self.error.factor_of_samples(samples),
+            _ => 1.0,
+        };
+        [samples / slack, samples * slack].map(|samples| self.cost.seconds(samples))
+    }
+
     /// Samples per pixel for the goal, when the pilots have taken `spent` seconds.
     pub fn samples(&self, goal: Goal, spent: f64) -> u32 {
         let for_error = goal.error.map(|error| match self.lit {
@@ -437,7 +461,7 @@ impl<'a> Trial<'a> {
     pub fn predict(&self, candidate: &mut Candidate, asked: &Asked<'_>, spent: f64) {
         let (goal, asked_pixels) = (asked.goal, asked.pixels());
         candidate.pilot_spp = self.spp;
-        candidate.last_pilot_spp = self.last_spp;
+        candidate.last_pilot_spp = self.last_spp();
         candidate.pilot_noise = self.relative_mse(self.spp).sqrt();
         candidate.slope = self.error.slope();
         candidate.seconds_a_sample = self.cost.sample;

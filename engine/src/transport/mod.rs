@@ -20,6 +20,7 @@ pub mod phong;
 pub mod random;
 pub mod random_table;
 pub mod shading_normal;
+pub mod sobol;
 mod surface_spec;
 pub mod warp;
 

@@ -2,11 +2,13 @@
 //!
 //! Method: PCG hashes of Jarzynski and Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020); shuffled and Owen-scrambled
 //! Sobol' (0,2)-sequence padded by slots of two dimensions, Burley, "Practical Hash-based Owen Scrambling" (JCGT 10(4), 2020),
-//! with the hash constants of Vegdahl (2021). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
+//! with the hash constants of Vegdahl (2021). Jointly stratified, the first slots of a stream are pairs of one sequence of sixteen dimensions
+//! ([`sobol`]). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
 //! values lie on the 2⁻²⁴ grid of [0, 1). Twin of `transport/random.glsl`, bit for bit.
 
+use super::sobol::{SOBOL_INDEX_BITS, SOBOL_PAIRS, sobol_pair};
 use crate::catalogue::{Bias, Role, Row, sources};
-use crate::gpu::shaders::constants::{SAMPLER_PCG, SAMPLER_SOBOL, SEQUENCE_KEY};
+use crate::gpu::shaders::constants::{JOINT_KEY, SAMPLER_JOINT_SOBOL, SAMPLER_PCG, SAMPLER_SOBOL, SEQUENCE_KEY};
 use glam::{DVec2, UVec3, UVec4};
 
 const PCG_MULTIPLIER: u32 = 1_664_525;
@@ -22,6 +24,9 @@ pub enum SamplerKind {
     Sobol = SAMPLER_SOBOL,
     /// Independent hashes.
     Pcg = SAMPLER_PCG,
+    /// The first eight slots jointly stratified by one Owen-scrambled Sobol' sequence of sixteen dimensions (pixel, lens, and the first two
+    /// bounces), the others as with [`SamplerKind::Sobol`].
+    JointSobol = SAMPLER_JOINT_SOBOL,
 }
 
 /// One stream of random numbers.
@@ -110,16 +115,29 @@ pub fn sobol_pascal(index: u32) -> u32 {
     p ^ ((p & 0xaaaa_aaaa) >> 1)
 }
 
+/// The two random words of one of the first [`SOBOL_PAIRS`] slots of a joint sequence. Runs of 2^[`SOBOL_INDEX_BITS`] samples are scrambled each by
+/// itself.
+pub fn joint_sobol_bits(s: &Sampler) -> [u32; 2] {
+    let run = SEQUENCE_KEY.wrapping_add(s.sample_index >> SOBOL_INDEX_BITS);
+    let index = owen_scramble(s.sample_index, pcg4d(UVec4::new(s.pixel, run, JOINT_KEY, s.seed)).x);
+    let key = pcg4d(UVec4::new(s.pixel, run, s.dimension, s.seed));
+    let [x, y] = sobol_pair(index, s.dimension);
+    [owen_scramble(x, key.y), owen_scramble(y, key.z)]
+}
+
 /// The two random words of the sampler's current slot.
 pub fn sampler_bits(s: &Sampler, kind: SamplerKind) -> [u32; 2] {
+    if kind == SamplerKind::JointSobol && s.dimension < SOBOL_PAIRS {
+        return joint_sobol_bits(s);
+    }
     let salt = match kind {
-        SamplerKind::Sobol => SEQUENCE_KEY,
+        SamplerKind::Sobol | SamplerKind::JointSobol => SEQUENCE_KEY,
         SamplerKind::Pcg => s.sample_index,
     };
     let key = pcg4d(UVec4::new(s.pixel, salt, s.dimension, s.seed));
     match kind {
         SamplerKind::Pcg => [key.x, key.y],
-        SamplerKind::Sobol => {
+        SamplerKind::Sobol | SamplerKind::JointSobol => {
             let index = owen_scramble(s.sample_index, key.x);
             [
                 owen_hash_reversed(index, key.y).reverse_bits(),
@@ -149,13 +167,18 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-SOBOL",
         name: "Owen-scrambled Sobol' points by hashing",
         role: Role::PartOf("BG-3"),
-        limits: "Even in pairs of dimensions only, so the gain fades with the bounces.",
-        sources: &[sources::BURLEY_2020.whole(), sources::LAINE_KARRAS_2011.whole()],
-        shaders: &["shaders/transport/random.glsl"],
+        limits: "Even in pairs of dimensions only, or in the sixteen first ones, so the gain fades with the bounces.",
+        sources: &[
+            sources::BURLEY_2020.whole(),
+            sources::LAINE_KARRAS_2011.whole(),
+            sources::JOE_KUO_2008.at("direction numbers of the first sixteen dimensions"),
+        ],
+        shaders: &["shaders/transport/random.glsl", "shaders/transport/sobol.glsl"],
         bias: Some(Bias::Unbiased),
         tests: &[
             "engine/src/transport/random.rs::pascal_steps_equal_the_direction_numbers",
             "engine/src/transport/random.rs::sobol_pairs_are_stratified_plain_and_scrambled",
+            "engine/src/transport/random.rs::joint_points_are_stratified_across_slots",
             "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
             "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
             "tests/tests/twins/random.rs::random_numbers_are_equal_bit_for_bit",
@@ -240,6 +263,45 @@ mod tests {
             .map(|i| [pcg4d(UVec4::new(i, 0, 0, 0)).x, pcg4d(UVec4::new(i, 0, 0, 0)).y])
             .collect();
         assert!(!is_stratified(&independent), "the check must be able to fail");
+    }
+
+    #[test]
+    fn joint_points_are_stratified_across_slots() {
+        let sample = |pixel: u32, sample_index: u32, dimension: u32| Sampler {
+            pixel,
+            sample_index,
+            dimension,
+            seed: 9,
+        };
+        for pixel in 0..8 {
+            for slot in 0..SOBOL_PAIRS {
+                // Each coordinate by itself, in any run of 2^m samples that begins at a multiple of it.
+                for first in [0, 1024, 65_536, 3 * 65_536 + 512] {
+                    let words: Vec<[u32; 2]> = (first..first + 256)
+                        .map(|i| sampler_bits(&sample(pixel, i, slot), SamplerKind::JointSobol))
+                        .collect();
+                    for axis in 0..2 {
+                        let mut cells: Vec<u32> = words.iter().map(|word| word[axis] >> 24).collect();
+                        cells.sort_unstable();
+                        assert!(
+                            cells.iter().enumerate().all(|(i, cell)| i as u32 == *cell),
+                            "{slot} {axis}"
+                        );
+                    }
+                }
+            }
+            // The first coordinates of the pixel's and the first bounce's slot are dimensions 1 and 5, a (2,2)-sequence: of 2^9 points as many lie in
+            // each of 8 × 8 cells.
+            for kind in [SamplerKind::JointSobol, SamplerKind::Sobol] {
+                let mut cells = [0_u32; 64];
+                for i in 0..512 {
+                    let [a, b] = [0, 2].map(|slot| sampler_bits(&sample(pixel, i, slot), kind)[0] >> 29);
+                    cells[(a * 8 + b) as usize] += 1;
+                }
+                let even = cells.iter().all(|count| *count == 8);
+                assert_eq!(even, kind == SamplerKind::JointSobol, "{kind:?}: {cells:?}");
+            }
+        }
     }
 
     #[test]

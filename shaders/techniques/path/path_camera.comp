@@ -7,7 +7,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL or SAMPLER_PCG
+layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL, SAMPLER_PCG or SAMPLER_JOINT_SOBOL
 layout(constant_id = 1) const bool HAS_LENS = true;
 layout(constant_id = 2) const bool ORTHOGRAPHIC = false;
 layout(constant_id = 3) const bool WRITE_AOVS = true;

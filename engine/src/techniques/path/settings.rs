@@ -51,7 +51,9 @@ crate::settings! {
         /// Which light paths the picture contains.
         pub path_set: PathSet = PathSet::ALL,
             in "all | emitted | direct | indirect | bounces=A..B, with lobes=diffuse+glossy+…; or path expressions: LDE, LS+DE, L[DG]{1,3}E, !L.*S.*E …";
-        /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
+        /// Owen-scrambled Sobol' points or independent samples (PCG); changes the noise only.
+        ///
+        /// `sobol` stratifies each pair of dimensions by itself, `joint-sobol` the first sixteen together: pixel, lens and the first two bounces.
         pub sampler: SamplerKind = SamplerKind::Sobol;
         /// First bounce at which Russian roulette may end a path; changes the noise only.
         pub roulette_start: u32 = 4, in 0..=4096, unit "bounces";

@@ -34,12 +34,12 @@ const PAIRS: [(&str, Asked); 22] = [
     ("builtin:cornell-box?sphere=gold", Asked::Error(0.05)),
     ("builtin:cornell-box?sphere=glass", Asked::Error(0.3)),
     ("builtin:materials", Asked::Error(0.1)),
-    ("builtin:slab", Asked::Error(0.05)),
+    ("builtin:forest", Asked::Error(0.1)),
     ("builtin:wax", Asked::Error(0.2)),
     ("builtin:medium-slab", Asked::Error(0.05)),
     ("builtin:smoke", Asked::Error(0.1)),
-    ("builtin:fog-box?source=point", Asked::Error(0.1)),
-    ("builtin:cloud", Asked::Error(0.1)),
+    ("builtin:fog-box?source=point", Asked::Error(0.3)),
+    ("builtin:cloud", Asked::Error(0.3)),
 ];
 /// Choices of each, with a seed and a picture of their own.
 const CHOICES: u32 = 5;
@@ -143,11 +143,11 @@ const OF_GOALS: &[Criterion<Aimed>] = &[
         |row: &Aimed| (&row.ratio).into(),
     ),
     Criterion::each(
-        "pilots take at most a quarter of the time where it is above five seconds: their share",
+        "pilots take at most a quarter of the time of each picture where it is above five seconds: the largest share",
         Bound::AtMost(PILOT_SHARE),
-        |row: &Aimed| (&row.pilots).into(),
+        |row: &Aimed| Measured::exact(shares_of_long(row).fold(0.0, f64::max)),
     )
-    .among(|row| row.seconds.measured().value > LONG),
+    .among(|row| shares_of_long(row).next().is_some()),
     Criterion::each(
         "no more time is taken than was asked for, less is no fault: seconds over those asked for",
         Bound::AtMost(FACTOR),
@@ -155,6 +155,14 @@ const OF_GOALS: &[Criterion<Aimed>] = &[
     )
     .among(|row| row.time.is_some()),
 ];
+
+/// The pilots' shares of all time, pilots' and picture's, where that is long.
+fn shares_of_long(row: &Aimed) -> impl Iterator<Item = f64> {
+    let pictures = row.seconds.0.iter().zip(&row.pilots.0);
+    pictures
+        .filter(|(seconds, _)| **seconds > LONG)
+        .map(|(_, share)| *share)
+}
 
 /// All errors over those asked for.
 fn ratios(rows: &[&Aimed]) -> Vec<f64> {
