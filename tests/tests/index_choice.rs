@@ -1,5 +1,5 @@
 //! A picture does not depend on the ray index: every index reports the hit of least distance, of equal ones the triangle of least index,
-//! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included.
+//! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included; but for instances that two levels keep.
 
 use clerestory::accel::IndexKind;
 use std::sync::Arc;
@@ -79,6 +79,10 @@ fn pictures_are_the_same_to_the_bit_with_every_index() {
             let mut first: Option<(Vec<u32>, f64)> = None;
             for name in IndexKind::NAMES {
                 let kind: IndexKind = name.parse().unwrap();
+                // The city's boxes are instances, which two levels keep, with vertices that are elsewhere by rounding (tests/tests/instances.rs).
+                if what == "city" && name == "two-level" {
+                    continue;
+                }
                 if !kind.is_offered_by(gpu.caps()) {
                     println!("{what}: not supported: {name}");
                     continue;

@@ -42,6 +42,7 @@ mod stages;
 pub(crate) mod sweep;
 pub mod trace;
 pub mod triangle;
+pub mod two_level;
 pub mod wide;
 pub mod yardstick;
 

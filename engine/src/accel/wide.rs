@@ -12,8 +12,8 @@
 //! traversal returns exactly what trying all triangles in index order returns.
 
 mod collapse;
-mod grid;
-mod slots;
+pub(super) mod grid;
+pub(super) mod slots;
 pub mod traverse;
 
 pub use traverse::WideTraversal;

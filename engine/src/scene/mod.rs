@@ -13,6 +13,7 @@ pub mod metals;
 mod mtl;
 pub mod normal_map;
 mod obj;
+mod placed;
 pub(crate) mod ply;
 pub(crate) mod profile;
 pub mod sidecar;
@@ -154,6 +155,15 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`].
     pub material: Option<u32>,
+}
+
+impl Mesh {
+    /// Least and greatest corner of its vertices in its own space; infinite, and the least above the greatest, without any.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let none = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let with = |[lower, upper]: [Vec3; 2], p: &Vec3| [lower.min(*p), upper.max(*p)];
+        self.positions.iter().fold(none, with)
+    }
 }
 
 /// A mesh placed in the world.
