@@ -20,9 +20,6 @@
 const uint WIDE_MAX_DEPTH = 32u;
 // Iterations of a round beside its nodes and triangles: the round, and both loops where no lane goes through them.
 const uint WIDE_ROUND_ITERATIONS = 4u;
-// Where the exponent stands in a number.
-const uint WIDE_EXPONENT_SHIFT = 23u;
-const uint WIDE_EXPONENT_MASK = 0xFFu << WIDE_EXPONENT_SHIFT;
 
 // Bits of what a slot can hold.
 #define WIDE_SLOT_HOLDS(SLOT) (7u << (3u * SLOT) | 1u << (WIDE_INNER_SHIFT + SLOT))

@@ -617,7 +617,7 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
         2,
         &[
             "octree",
-            "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd, wide, two-level, driver, auto",
+            "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd, wide, wide-device, two-level, driver, auto",
         ],
     )?;
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;

@@ -13,7 +13,7 @@ use super::driver::DriverIndex;
 use super::kd::{KdSettings, KdTree};
 use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
 use super::two_level::{MeshGeometry, Placement, TwoLevelBvh};
-use super::wide::{WideBvh, WideSettings};
+use super::wide::{WideBuilder, WideBvh, WideSettings};
 use super::{BuildStages, DeviceTraversal, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::{BindingSet, BoundResource};
@@ -38,6 +38,8 @@ pub enum IndexKind {
     Kd(KdSettings),
     /// Eight children a node, compressed, made of the optimised linear hierarchy.
     Wide(WideSettings),
+    /// The same made of the linear hierarchy as its codes spell it, both by the device where a scene is uploaded, and left there.
+    WideOnDevice(WideSettings),
     /// The same for each mesh, and one over the instances that place them: a scene is kept as it is described, where the others flatten it.
     TwoLevel(WideSettings),
     /// One of both: two levels where a scene needs much less memory with them or would not fit without, and the wide hierarchy elsewhere, whose rays are
@@ -55,14 +57,15 @@ impl Default for IndexKind {
 
 impl IndexKind {
     /// The names of all that can be built: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
-    /// the device, the kd-tree, the wide hierarchy, two levels of it, and the driver's acceleration structure.
-    pub const NAMES: [&'static str; 8] = [
+    /// the device, the kd-tree, the wide hierarchy, one built by the device, two levels of it, and the driver's acceleration structure.
+    pub const NAMES: [&'static str; 9] = [
         "bvh2",
         "lbvh",
         "lbvh-high",
         "lbvh-device",
         "kd",
         "wide",
+        "wide-device",
         "two-level",
         "driver",
     ];
@@ -89,6 +92,7 @@ impl IndexKind {
             Self::LbvhOnDevice(_) => "lbvh-device",
             Self::Kd(_) => "kd",
             Self::Wide(_) => "wide",
+            Self::WideOnDevice(_) => "wide-device",
             Self::TwoLevel(_) => "two-level",
             Self::Automatic(_) => Self::AUTOMATIC,
             Self::Driver => "driver",
@@ -110,16 +114,14 @@ impl IndexKind {
         Ok(match self {
             Self::Bvh2(settings) => Box::new(Bvh2::build(triangles, settings)?),
             Self::Lbvh(settings) => Box::new(lbvh::build(triangles, settings)?),
-            Self::LbvhOnDevice(settings) => {
-                let settings = LbvhSettings {
-                    quality: BuildQuality::Fast,
-                    ..*settings
-                };
-                Box::new(lbvh::build(triangles, &settings)?)
-            }
+            Self::LbvhOnDevice(settings) => Box::new(lbvh::build(triangles, &as_codes_spell_it(settings))?),
             Self::Kd(settings) => Box::new(KdTree::build(triangles, settings)?),
             // Triangles alone have no instances.
             Self::Wide(settings) | Self::Automatic(settings) => Box::new(WideBvh::build(triangles, settings)?),
+            Self::WideOnDevice(settings) => {
+                let binary = as_codes_spell_it(&settings.binary);
+                Box::new(WideBvh::build(triangles, &WideSettings { binary, ..*settings })?)
+            }
             Self::TwoLevel(settings) => {
                 let mesh = MeshGeometry { triangles, names: None };
                 Box::new(TwoLevelBvh::build(&[mesh], &[Placement::identity(0)], settings)?)
@@ -163,31 +165,43 @@ impl IndexKind {
             });
         }
         let mut fallback = None;
-        if let Self::LbvhOnDevice(settings) = self {
-            let builder = LbvhBuilder::new(gpu, settings)?;
-            let begin = Instant::now();
-            match builder.build_resident(triangles) {
-                Ok(Some(built)) => {
-                    let build_ms = 1e3 * begin.elapsed().as_secs_f64();
-                    let report = IndexReport::of(self.name(), build_ms, built.stages, built.statistics);
-                    return Ok(IndexOnDevice {
-                        texels: built.quarters,
-                        structure: None,
-                        traversal: DeviceTraversal::Bvh2,
-                        report,
-                    });
-                }
-                Ok(None) => fallback = Some("fewer than two triangles that rays can meet"),
-                // What the build needs is more than what remains of it.
-                Err(Error::LimitExceeded { .. }) => {
-                    fallback = Some("more triangles than the device can bind or dispatch while it builds")
-                }
-                Err(error) => return Err(error),
+        let begin = Instant::now();
+        match self.build_resident(gpu, triangles) {
+            Ok(Resident::Built(texels, traversal, stages, statistics)) => {
+                let build_ms = 1e3 * begin.elapsed().as_secs_f64();
+                return Ok(IndexOnDevice {
+                    texels,
+                    structure: None,
+                    traversal,
+                    report: IndexReport::of(self.name(), build_ms, stages, statistics),
+                });
             }
+            Ok(Resident::OfHosts) => {}
+            Ok(Resident::TooFew) => fallback = Some("fewer than two triangles that rays can meet"),
+            // What the build needs is more than what remains of it.
+            Err(Error::LimitExceeded { .. }) => {
+                fallback = Some("more triangles than the device can bind or dispatch while it builds")
+            }
+            Err(error) => return Err(error),
         }
         let (index, report) = self.build_timed(triangles, folder)?;
         let host_because = fallback;
         IndexOnDevice::of(gpu, index.as_ref(), IndexReport { host_because, ..report })
+    }
+
+    /// Builds on the device, where the kind says so.
+    fn build_resident(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<Resident> {
+        Ok(match self {
+            Self::LbvhOnDevice(settings) => match LbvhBuilder::new(gpu, settings)?.build_resident(triangles)? {
+                Some(built) => Resident::Built(built.quarters, DeviceTraversal::Bvh2, built.stages, built.statistics),
+                None => Resident::TooFew,
+            },
+            Self::WideOnDevice(settings) => match WideBuilder::new(gpu, settings)?.build_resident(triangles)? {
+                Some(built) => Resident::Built(built.texels, DeviceTraversal::Wide, built.stages, built.statistics),
+                None => Resident::TooFew,
+            },
+            _ => Resident::OfHosts,
+        })
     }
 
     /// Builds on the host, or reads what was kept, and says how long that took.
@@ -221,6 +235,22 @@ impl IndexKind {
     }
 }
 
+/// What a device was asked to build.
+enum Resident {
+    Built(TexelView, DeviceTraversal, BuildStages, IndexStatistics),
+    TooFew,
+    /// The kind is built by the host.
+    OfHosts,
+}
+
+/// The settings of the tree that devices build.
+fn as_codes_spell_it(settings: &LbvhSettings) -> LbvhSettings {
+    LbvhSettings {
+        quality: BuildQuality::Fast,
+        ..*settings
+    }
+}
+
 impl fmt::Display for IndexKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
@@ -240,6 +270,7 @@ impl FromStr for IndexKind {
             Self::LbvhOnDevice(LbvhSettings::default()),
             Self::Kd(KdSettings::default()),
             Self::Wide(WideSettings::default()),
+            Self::WideOnDevice(WideSettings::default()),
             Self::TwoLevel(WideSettings::default()),
             Self::Automatic(WideSettings::default()),
             Self::Driver,
@@ -406,8 +437,8 @@ mod tests {
             .collect();
         // That of the driver alone no host builds.
         let of_hosts = IndexKind::NAMES.into_iter().filter(|name| *name != "driver");
-        assert_eq!(of_hosts.clone().count(), 7);
-        for (name, builder) in of_hosts.zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide", "two-level"]) {
+        assert_eq!(of_hosts.clone().count(), 8);
+        for (name, builder) in of_hosts.zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide", "wide", "two-level"]) {
             let (index, report) = name
                 .parse::<IndexKind>()
                 .unwrap()

@@ -162,6 +162,18 @@ pub struct IndexStatistics {
     pub bytes: u64,
 }
 
+impl IndexStatistics {
+    /// The counts of triangles alone.
+    fn of_triangles(&self) -> Self {
+        Self {
+            triangles: self.triangles,
+            excluded_range: self.excluded_range,
+            excluded_degenerate: self.excluded_degenerate,
+            ..Self::default()
+        }
+    }
+}
+
 /// Exact work counters of a traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]

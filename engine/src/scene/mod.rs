@@ -90,6 +90,19 @@ impl Scene {
         });
     }
 
+    /// All instances' triangles in world space, metres, with the index of their material; no material is `None`. Indices of vertices and of meshes must be in
+    /// range, as [`Scene::check`] sees to it.
+    pub fn triangles(&self) -> impl Iterator<Item = ([Vec3; 3], Option<u32>)> + '_ {
+        self.instances.iter().flat_map(|instance| {
+            let mesh = &self.meshes[instance.mesh as usize];
+            let place = |i: u32| {
+                let position = mesh.positions[i as usize].as_dvec3();
+                instance.transform.transform_point3(position).as_vec3()
+            };
+            mesh.triangles.iter().map(move |t| (t.map(place), mesh.material))
+        })
+    }
+
     /// Adds a light without area.
     pub fn add_light(&mut self, name: impl Into<String>, kind: LightKind) {
         self.lights.push(Light {

@@ -1,12 +1,12 @@
 //! What changes when instances move or meshes are refitted: the tree over the instances is made anew, and a mesh's boxes.
 
-use super::refit::refit;
 use super::{
     HEADER_TEXELS, Header, INSTANCE_TEXELS, InstanceNode, InstanceRecord, NODE_TEXELS, TwoLevelBvh, parts_of, top,
 };
 use crate::accel::bvh2::Bvh2Triangle;
 use crate::accel::input::can_be_met;
 use crate::accel::wide::WideNode;
+use crate::accel::wide::refit::refit_nodes;
 use crate::accel::{Aabb, IndexStatistics, MAX_COORDINATE};
 use crate::{Error, Result};
 use bytemuck::Zeroable;
@@ -144,7 +144,7 @@ impl TwoLevelBvh {
         let (root, first_triangle) = (tree.root, tree.first_triangle);
         let [nodes_range, triangles_range] = ranges;
         let nodes: &mut [WideNode] = bytemuck::cast_slice_mut(&mut self.texels[nodes_range.clone()]);
-        refit(nodes, root, &moved, first_triangle);
+        refit_nodes(nodes, root, &moved, first_triangle);
         let parts = parts_of(nodes);
         self.texels[triangles_range].copy_from_slice(bytemuck::cast_slice(&moved));
         let parts = std::mem::replace(&mut self.meshes[mesh].parts, parts);

@@ -10,7 +10,6 @@
 //! same bytes whatever the number of threads.
 
 mod changes;
-mod refit;
 pub(crate) mod top;
 pub mod transform;
 pub mod traverse;

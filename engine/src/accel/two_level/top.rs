@@ -6,7 +6,7 @@
 use crate::accel::Aabb;
 use crate::accel::box_tree::{BoxTree, Child};
 use crate::accel::lbvh::{LbvhSettings, hierarchy_of};
-use crate::accel::wide::grid::GridAxis;
+use crate::accel::wide::frame::set_boxes;
 use crate::accel::wide::slots::assign;
 use crate::accel::wide::{SLOTS, WideNode};
 use crate::gpu::shaders::constants;
@@ -100,12 +100,15 @@ impl Top {
             .map(|slot| (slot.bounds, matches!(slot.child, Child::Inner(_))))
             .collect();
         let assigned = assign(0.5 * bounds.lower + 0.5 * bounds.upper, &placed);
-        let grid = [0, 1, 2].map(|axis: usize| GridAxis::over(bounds.lower[axis], bounds.upper[axis]));
         let mut node = WideNode {
-            corner: Vec3::from_array(grid.map(|axis| axis.corner)),
             children: self.nodes.len() as u32,
             ..self.nodes[place]
         };
+        let boxes = slots
+            .iter()
+            .zip(assigned)
+            .map(|(slot, at)| (usize::from(at), slot.bounds));
+        set_boxes(&mut node, bounds, boxes);
         let (mut instances, mut below) = (0u8, Vec::new());
         for at in 0..SLOTS {
             let Some(slot) = (0..slots.len())
@@ -114,11 +117,6 @@ impl Top {
             else {
                 continue;
             };
-            for (axis, grid) in grid.iter().enumerate() {
-                let [lower, upper] = grid.planes(slot.bounds.lower[axis], slot.bounds.upper[axis]);
-                node.planes[axis][0][at] = lower;
-                node.planes[axis][1][at] = upper;
-            }
             node.slots |= 1 << (constants::WIDE_INNER_SHIFT as usize + at);
             let child = self.nodes.len();
             match slot.child {
@@ -134,7 +132,7 @@ impl Top {
                 ..WideNode::zeroed()
             });
         }
-        node.exponents = u32::from_le_bytes([grid[0].exponent, grid[1].exponent, grid[2].exponent, instances]);
+        node.exponents |= u32::from(instances) << constants::TWO_LEVEL_INSTANCE_SHIFT;
         self.nodes[place] = node;
         below
     }

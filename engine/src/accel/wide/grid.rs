@@ -16,7 +16,7 @@ const LAST_PLANE: f64 = 255.0;
 
 /// An axis of a node's grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::accel) struct GridAxis {
+pub(super) struct GridAxis {
     /// Corner, metres.
     pub corner: f32,
     /// Biased exponent of the step.
