@@ -4,10 +4,10 @@ use super::{
     HEADER_TEXELS, Header, INSTANCE_TEXELS, InstanceNode, InstanceRecord, NODE_TEXELS, TwoLevelBvh, parts_of, top,
 };
 use crate::accel::bvh2::Bvh2Triangle;
-use crate::accel::input::can_be_met;
+use crate::accel::lbvh::{check_moved, moved_corners};
 use crate::accel::wide::WideNode;
 use crate::accel::wide::refit::refit_nodes;
-use crate::accel::{Aabb, IndexStatistics, MAX_COORDINATE};
+use crate::accel::{Aabb, IndexStatistics};
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use glam::{DAffine3, Vec3};
@@ -124,22 +124,16 @@ impl TwoLevelBvh {
         let Some(tree) = self.meshes.get(mesh) else {
             return Err(Error::setting("mesh", mesh, "does not exist"));
         };
-        let statistics = &tree.statistics;
-        let count = statistics.triangles + statistics.excluded_range + statistics.excluded_degenerate;
-        if triangles.len() as u64 != count || tree.has_names {
-            let cause = format!("is not the {count} that the index was built of, or they have names of their own");
-            return Err(Error::setting("triangles", triangles.len(), cause));
+        if tree.has_names {
+            return Err(Error::setting("mesh", mesh, "has triangles with names of their own"));
         }
         let ranges = self.mesh_texels(mesh);
         let old = ranges.clone().map(|range| self.texels[range].to_vec());
         let mut moved: Vec<Bvh2Triangle> = bytemuck::cast_slice(&old[1]).to_vec();
-        for triangle in &mut moved {
-            let corners = triangles[triangle.index as usize];
-            if !corners.iter().all(|v| v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all()) {
-                let name = format!("triangles[{}]", triangle.index);
-                return Err(Error::setting(name, format!("{corners:?}"), "has moved out of range"));
-            }
-            triangle.corners = if can_be_met(&corners) { corners } else { [corners[0]; 3] };
+        check_moved(&tree.statistics, &moved, triangles)?;
+        let indices: Vec<u32> = moved.iter().map(|triangle| triangle.index).collect();
+        for (triangle, corners) in moved.iter_mut().zip(moved_corners(&indices, triangles)) {
+            triangle.corners = corners;
         }
         let (root, first_triangle) = (tree.root, tree.first_triangle);
         let [nodes_range, triangles_range] = ranges;
