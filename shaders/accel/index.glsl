@@ -12,6 +12,7 @@ const uint INDEX_BVH2 = 0u;
 const uint INDEX_KD = 1u;
 const uint INDEX_WIDE = 2u;
 const uint INDEX_DRIVER = 3u;
+const uint INDEX_TWO_LEVEL = 4u;
 
 #ifdef CLERESTORY_INDEX_DRIVER
 
@@ -27,6 +28,7 @@ uint any_hit(Ray ray, uint resume, inout Hit hit) { return driver_traverse(ray, 
 
 #include "accel/bvh2.glsl"
 #include "accel/kd.glsl"
+#include "accel/two_level.glsl"
 #include "accel/wide.glsl"
 
 layout(constant_id = 102) const uint INDEX_KIND = INDEX_BVH2;
@@ -39,6 +41,9 @@ uint closest_hit(Ray ray, uint resume, inout Hit hit) {
     if (INDEX_KIND == INDEX_WIDE) {
         return wide_traverse(ray, resume, false, hit);
     }
+    if (INDEX_KIND == INDEX_TWO_LEVEL) {
+        return two_level_traverse(ray, resume, false, hit);
+    }
     return bvh2_traverse(ray, resume, false, hit);
 }
 
@@ -49,6 +54,9 @@ uint any_hit(Ray ray, uint resume, inout Hit hit) {
     }
     if (INDEX_KIND == INDEX_WIDE) {
         return wide_traverse(ray, resume, true, hit);
+    }
+    if (INDEX_KIND == INDEX_TWO_LEVEL) {
+        return two_level_traverse(ray, resume, true, hit);
     }
     return bvh2_traverse(ray, resume, true, hit);
 }

@@ -20,9 +20,6 @@
 const uint WIDE_MAX_DEPTH = 32u;
 // Iterations of a round beside its nodes and triangles: the round, and both loops where no lane goes through them.
 const uint WIDE_ROUND_ITERATIONS = 4u;
-// Where the exponent stands in a number.
-const uint WIDE_EXPONENT_SHIFT = 23u;
-const uint WIDE_EXPONENT_MASK = 0xFFu << WIDE_EXPONENT_SHIFT;
 
 // Bits of what a slot can hold.
 #define WIDE_SLOT_HOLDS(SLOT) (7u << (3u * SLOT) | 1u << (WIDE_INNER_SHIFT + SLOT))
@@ -63,6 +60,20 @@ bvec4 wide_met(WideGrid grid, uvec3 near, uvec3 far, float t_min, float t_max) {
     vec4 enter = max(max(near_x, near_y), max(near_z, vec4(t_min)));
     vec4 leave = min(min(far_x, far_y), min(far_z, vec4(t_max)));
     return lessThanEqual(enter, leave);
+}
+
+// Bits of what the slots can hold whose boxes a ray meets: the texels of a node but for its words.
+uint wide_slots_met(BoxTest boxes, bvec3 backwards, uvec4 frame, uvec4 x, uvec4 y, uvec4 z, float t_min, float t_max) {
+    WideGrid grid = wide_grid(boxes, uintBitsToFloat(frame.xyz), frame.w);
+    x = backwards.x ? x.zwxy : x;
+    y = backwards.y ? y.zwxy : y;
+    z = backwards.z ? z.zwxy : z;
+    bvec4 low = wide_met(grid, uvec3(x.x, y.x, z.x), uvec3(x.z, y.z, z.z), t_min, t_max);
+    bvec4 high = wide_met(grid, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), t_min, t_max);
+    return (low.x ? WIDE_SLOT_HOLDS(0u) : 0u) | (low.y ? WIDE_SLOT_HOLDS(1u) : 0u)
+         | (low.z ? WIDE_SLOT_HOLDS(2u) : 0u) | (low.w ? WIDE_SLOT_HOLDS(3u) : 0u)
+         | (high.x ? WIDE_SLOT_HOLDS(4u) : 0u) | (high.y ? WIDE_SLOT_HOLDS(5u) : 0u)
+         | (high.z ? WIDE_SLOT_HOLDS(6u) : 0u) | (high.w ? WIDE_SLOT_HOLDS(7u) : 0u);
 }
 
 // Bits of slots as bits of places in a ray's order, place = slot ^ octant, and the other way round.
@@ -123,17 +134,7 @@ uint wide_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit) {
             uvec4 x = index_texel(texel + 2u);
             uvec4 y = index_texel(texel + 3u);
             uvec4 z = index_texel(texel + 4u);
-            WideGrid grid = wide_grid(boxes, uintBitsToFloat(frame.xyz), frame.w);
-            x = backwards.x ? x.zwxy : x;
-            y = backwards.y ? y.zwxy : y;
-            z = backwards.z ? z.zwxy : z;
-            bvec4 low = wide_met(grid, uvec3(x.x, y.x, z.x), uvec3(x.z, y.z, z.z), ray.t_min, hit.t);
-            bvec4 high = wide_met(grid, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), ray.t_min, hit.t);
-            uint met = (low.x ? WIDE_SLOT_HOLDS(0u) : 0u) | (low.y ? WIDE_SLOT_HOLDS(1u) : 0u)
-                     | (low.z ? WIDE_SLOT_HOLDS(2u) : 0u) | (low.w ? WIDE_SLOT_HOLDS(3u) : 0u)
-                     | (high.x ? WIDE_SLOT_HOLDS(4u) : 0u) | (high.y ? WIDE_SLOT_HOLDS(5u) : 0u)
-                     | (high.z ? WIDE_SLOT_HOLDS(6u) : 0u) | (high.w ? WIDE_SLOT_HOLDS(7u) : 0u);
-            met &= below.z;
+            uint met = wide_slots_met(boxes, backwards, frame, x, y, z, ray.t_min, hit.t) & below.z;
             uint found = met & WIDE_TRIANGLE_MASK;
             uint order = wide_in_order(met >> WIDE_INNER_SHIFT, octant);
             if (INDEX_RESUMES) {

@@ -22,5 +22,8 @@ const uint WIDE_NODE_TRIANGLES = WIDE_SLOTS * WIDE_LEAF_SIZE;
 const uint WIDE_INNER_SHIFT = WIDE_NODE_TRIANGLES;
 const uint WIDE_TRIANGLE_MASK = (1u << WIDE_INNER_SHIFT) - 1u;
 const uint WIDE_ORDER_MASK = (1u << WIDE_SLOTS) - 1u;
+// Where the exponent stands in a number.
+const uint WIDE_EXPONENT_SHIFT = 23u;
+const uint WIDE_EXPONENT_MASK = 0xFFu << WIDE_EXPONENT_SHIFT;
 
 #endif

@@ -7,6 +7,7 @@
 #ifndef CLERESTORY_RASTER_BINDINGS_GLSL
 #define CLERESTORY_RASTER_BINDINGS_GLSL
 
+#define CLERESTORY_FLAT_SCENE
 #include "scene/bindings.glsl"
 
 // Octants have planes between them; other views have none, and signs of 0.

@@ -1,5 +1,6 @@
 // The scene on the device: set 2, filled by clerestory::transport::GpuScene. What a scene lacks is a buffer of one texel that no
-// specialized kernel reads. Triangles are in world space and keep their order in the scene.
+// specialized kernel reads. Triangles are in world space and keep their order in the scene, unless instances are kept: then those of meshes that are
+// placed often are stored once, in the space of the mesh, and the load functions make what stands for a triangle's number.
 //
 // Everything is read by texel fetches, which software drivers gather for all lanes at once, where they load storage buffers lane by lane and
 // word by word. Records are in quarters (four words); the load functions name their fields, and scene/records.comp tells the host.
@@ -8,7 +9,15 @@
 
 #extension GL_EXT_samplerless_texture_functions : require
 
+#include "scene/instance.glsl"
 #include "scene/records.glsl"
+
+// Instances are kept. Includers that draw triangles by their places define CLERESTORY_FLAT_SCENE and are not given such scenes.
+#ifdef CLERESTORY_FLAT_SCENE
+const bool HAS_INSTANCES = false;
+#else
+layout(constant_id = 29) const bool HAS_INSTANCES = false;
+#endif
 
 // descriptor set 2: SceneSet
 
@@ -30,6 +39,7 @@ layout(set = 2, binding = 11) uniform utextureBuffer scene_environment;
 layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
 // The tree of lights, where a kernel chooses by one: its nodes, the first of which is the root, then by light its trail, four in a quarter.
 layout(set = 2, binding = 13) uniform utextureBuffer scene_light_tree;
+layout(set = 2, binding = 14) uniform utextureBuffer scene_instances;  // by their first triangles, ascending
 
 float distribution_cdf(uint index) { return texelFetch(scene_cdf, int(index)).x; }
 vec4 environment_texel(uint index) {
@@ -44,16 +54,91 @@ uint light_count() { return uint(textureSize(scene_lights)) / LIGHT_QUARTERS; }
 // Where the table of the environment's cells begins, behind that of the lights.
 uint environment_cdf_base() { return light_count() + 1u; }
 
-SceneTriangle load_triangle(uint index) {
-    int first = int(TRIANGLE_QUARTERS * index);
+SceneTriangle stored_triangle(uint record) {
+    int first = int(TRIANGLE_QUARTERS * record);
     uvec4 q0 = texelFetch(scene_triangles, first);
     uvec4 q1 = texelFetch(scene_triangles, first + 1);
     uvec4 q2 = texelFetch(scene_triangles, first + 2);
     return SceneTriangle(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), q2.w);
 }
 
+SceneInstance load_instance(uint index) {
+    int first = int(INSTANCE_QUARTERS * index);
+    uvec4 q0 = texelFetch(scene_instances, first);
+    uvec4 q1 = texelFetch(scene_instances, first + 1);
+    uvec4 q2 = texelFetch(scene_instances, first + 2);
+    vec4 q3 = uintBitsToFloat(texelFetch(scene_instances, first + 3));
+    return SceneInstance(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), q1.w, uintBitsToFloat(q2.xyz), q2.w, q3.xyz, q3.w);
+}
+
+// The instance that a triangle is of: the last whose first triangle does not come behind it. Without instances what stands for the world.
+SceneInstance instance_of(uint triangle) {
+    if (!HAS_INSTANCES) {
+        return SceneInstance(vec3(0.0), 0u, vec3(0.0), 0u, vec3(0.0), INSTANCE_IDENTITY, vec3(0.0), 0.0);
+    }
+    uint low = 0u;
+    uint beyond = uint(textureSize(scene_instances)) / INSTANCE_QUARTERS;
+    while (beyond - low > 1u) {
+        uint middle = low + beyond >> 1;
+        bool behind = texelFetch(scene_instances, int(INSTANCE_QUARTERS * middle)).w > triangle;
+        beyond = behind ? middle : beyond;
+        low = behind ? low : middle;
+    }
+    return load_instance(low);
+}
+
+// Where a triangle of an instance is stored.
+uint instance_record(SceneInstance at, uint triangle) { return HAS_INSTANCES ? at.record + (triangle - at.first) : triangle; }
+
+bool instance_has(SceneInstance at, uint flag) { return HAS_INSTANCES && (at.flags & flag) != 0u; }
+
+vec3 instance_position(SceneInstance at, vec3 p) {
+    bool is_image = HAS_INSTANCES && !instance_has(at, INSTANCE_IDENTITY);
+    return is_image ? instance_vertex(at.row_x, at.row_y, at.row_z, at.translation, p) : p;
+}
+
+// A triangle of an instance, in world space.
+SceneTriangle load_triangle_of(SceneInstance at, uint index) {
+    SceneTriangle t = stored_triangle(instance_record(at, index));
+    bool swaps = instance_has(at, INSTANCE_MIRRORED);
+    vec3 b = swaps ? t.c : t.b;
+    vec3 c = swaps ? t.b : t.c;
+    return SceneTriangle(instance_position(at, t.a), t.material, instance_position(at, b), t.light, instance_position(at, c), t.around);
+}
+
+SceneTriangle load_triangle(uint index) { return load_triangle_of(instance_of(index), index); }
+
 // Vertices of a triangle, for its attributes.
-uvec3 load_vertices(uint index) { return texelFetch(scene_vertices, int(index)).xyz; }
+uvec3 load_vertices_of(SceneInstance at, uint index) {
+    uvec3 v = texelFetch(scene_vertices, int(instance_record(at, index))).xyz;
+    return instance_has(at, INSTANCE_MIRRORED) ? v.xzy : v;
+}
+
+uvec3 load_vertices(uint index) { return load_vertices_of(instance_of(index), index); }
+
+vec3 normalize_or_zero(vec3 v) {
+    float squared = dot(v, v);
+    return squared > 0.0 ? v * inversesqrt(squared) : vec3(0.0);
+}
+
+// Normal of a vertex in world space, or zero, which stands for "flat". Cofactors transform normals without dividing by a determinant.
+vec3 load_normal(SceneInstance at, uint vertex) {
+    vec3 n = texelFetch(scene_normals, int(vertex)).xyz;
+    if (!HAS_INSTANCES || instance_has(at, INSTANCE_IDENTITY)) {
+        return n;
+    }
+    vec3 world = vec3(dot(cross(at.row_y, at.row_z), n), dot(cross(at.row_z, at.row_x), n), dot(cross(at.row_x, at.row_y), n));
+    return normalize_or_zero(instance_has(at, INSTANCE_MIRRORED) ? -world : world);
+}
+
+// Tangent of a vertex in world space, with the sign of the bitangent.
+vec4 load_tangent(SceneInstance at, uint vertex) {
+    vec4 t = texelFetch(scene_tangents, int(vertex));
+    if (!HAS_INSTANCES || instance_has(at, INSTANCE_IDENTITY)) {
+        return t;
+    }
+    return vec4(normalize_or_zero(instance_rows(at.row_x, at.row_y, at.row_z, t.xyz)), instance_has(at, INSTANCE_MIRRORED) ? -t.w : t.w);
+}
 
 SceneMaterial load_material(uint index) {
     vec4 f0 = uintBitsToFloat(material_quarter(index, 0u));

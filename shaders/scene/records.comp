@@ -6,6 +6,7 @@
 
 layout(local_size_x = 1) in;
 
+#define CLERESTORY_FLAT_SCENE
 #include "scene/bindings.glsl"
 #include "scene/media.glsl"
 
@@ -18,10 +19,11 @@ layout(set = 0, binding = 0, scalar) restrict writeonly buffer SceneRecords {
     SceneMedium medium;
     SceneLightNode light_node;
     uint trails[2];
+    SceneInstance instance;
 } records;
 
 void main() {
-    records.triangle = load_triangle(0u);
+    records.triangle = stored_triangle(0u);
     records.material = load_material(0u);
     records.texture_record = load_texture(0u);
     records.light = load_light(0u);
@@ -30,4 +32,5 @@ void main() {
     records.light_node = load_light_node(0u);
     records.trails[0] = load_light_trail(0u);
     records.trails[1] = load_light_trail(5u);
+    records.instance = load_instance(0u);
 }

@@ -32,6 +32,7 @@ const uint LIGHT_NODE_LEAF = 0x80000000u;     // in `child`: what remains is a l
 const uint LIGHT_TREE_DEPTH_MAX = 30u;        // steps from the root to a light, a bit of its trail each
 const uint LIGHT_TRAIL_NONE = 0xFFFFFFFFu;    // of a light that is not in the tree
 const uint LIGHT_TRAILS_PER_QUARTER = 4u;
+const uint INSTANCE_QUARTERS = 4u;
 
 const uint PHASE_ISOTROPIC = 0u;
 const uint PHASE_HENYEY_GREENSTEIN = 1u;
@@ -45,6 +46,18 @@ struct SceneTriangle {
     uint light;  // index of its light, or NO_LIGHT
     vec3 c;
     uint around;  // of a body: material of the body that it is inside of, plus one; 0 without
+};
+
+// A mesh in a place, or meshes that are where they are and follow each other.
+struct SceneInstance {
+    vec3 row_x;       // rows of what takes it to world space
+    uint first;       // number of its first triangle
+    vec3 row_y;
+    uint record;      // where that is stored
+    vec3 row_z;
+    uint flags;       // INSTANCE_*
+    vec3 translation;
+    float spare;
 };
 
 struct SceneMaterial {

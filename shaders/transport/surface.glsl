@@ -31,7 +31,8 @@ struct Surface {
 vec3 interpolate(vec3 a, vec3 b, vec3 c, vec3 w) { return w.x * a + w.y * b + w.z * c; }
 
 Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
-    SceneTriangle triangle = load_triangle(hit.triangle);
+    SceneInstance at = instance_of(hit.triangle);
+    SceneTriangle triangle = load_triangle_of(at, hit.triangle);
     vec3 a = triangle.a;
     vec3 b = triangle.b;
     vec3 c = triangle.c;
@@ -50,11 +51,10 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     s.shading_normal = s.geometric_normal;
     uvec3 v = uvec3(0u);
     if (HAS_SHADING_NORMALS || HAS_TEXTURES || HAS_NORMAL_MAPS || HAS_VERTEX_COLORS) {
-        v = load_vertices(hit.triangle);
+        v = load_vertices_of(at, hit.triangle);
     }
     if (HAS_SHADING_NORMALS) {
-        vec3 n = interpolate(texelFetch(scene_normals, int(v.x)).xyz, texelFetch(scene_normals, int(v.y)).xyz,
-                             texelFetch(scene_normals, int(v.z)).xyz, w);
+        vec3 n = interpolate(load_normal(at, v.x), load_normal(at, v.y), load_normal(at, v.z), w);
         float squared = dot(n, n);
         if (squared > 0.0) {
             n *= inversesqrt(squared);
@@ -67,7 +67,7 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     }
     s.tangent = vec4(0.0);
     if (HAS_NORMAL_MAPS) {
-        s.tangent = interpolate_attribute(scene_tangents, v, w);
+        s.tangent = interpolate(load_tangent(at, v.x), load_tangent(at, v.y), load_tangent(at, v.z), w);
     }
     s.color = vec4(1.0);
     if (HAS_VERTEX_COLORS) {

@@ -43,7 +43,8 @@ void begin_candidates(uint slot, uint bounce, uint kind) {
 }
 
 bool accept_candidate(uint triangle, vec2 barycentrics) {
-    SceneMaterial m = load_material(load_triangle(triangle).material);
+    SceneInstance at = instance_of(triangle);
+    SceneMaterial m = load_material(load_triangle_of(at, triangle).material);
     if ((m.flags & (MATERIAL_MASK | MATERIAL_BLEND)) == 0u) {
         return true;
     }
@@ -51,7 +52,7 @@ bool accept_candidate(uint triangle, vec2 barycentrics) {
     vec4 uvs = vec4(0.0);
     vec4 color = vec4(1.0);
     if (HAS_TEXTURES || HAS_VERTEX_COLORS) {
-        uvec3 v = load_vertices(triangle);
+        uvec3 v = load_vertices_of(at, triangle);
         if (HAS_TEXTURES) {
             uvs = interpolate_attribute(scene_uvs, v, w);
         }

@@ -4,6 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "twin_interface.glsl"
+#define CLERESTORY_FLAT_SCENE
 #include "scene/texture.glsl"
 
 void out4(uint i, vec4 x) {

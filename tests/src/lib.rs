@@ -9,6 +9,7 @@ pub mod driver;
 pub mod render;
 pub mod shaders;
 pub mod statistics;
+pub mod traced;
 pub mod twin;
 
 pub use clerestory_hard_cases::random;

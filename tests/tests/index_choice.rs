@@ -1,5 +1,5 @@
 //! A picture does not depend on the ray index: every index reports the hit of least distance, of equal ones the triangle of least index,
-//! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included.
+//! from the same arithmetic. So pictures are equal to the bit, those of coincident triangles included; but for instances that two levels keep.
 
 use clerestory::accel::IndexKind;
 use std::sync::Arc;
@@ -79,6 +79,10 @@ fn pictures_are_the_same_to_the_bit_with_every_index() {
             let mut first: Option<(Vec<u32>, f64)> = None;
             for name in IndexKind::NAMES {
                 let kind: IndexKind = name.parse().unwrap();
+                // The city's boxes are instances, which two levels keep, with vertices that are elsewhere by rounding (tests/tests/instances.rs).
+                if what == "city" && name == "two-level" {
+                    continue;
+                }
                 if !kind.is_offered_by(gpu.caps()) {
                     println!("{what}: not supported: {name}");
                     continue;
@@ -201,23 +205,25 @@ fn alpha_and_media_leave_pictures_by_the_drivers_structure_the_same() {
 #[test]
 fn what_the_device_cannot_build_the_host_does_and_says_so() {
     with_gpu(|gpu| {
-        let kind: IndexKind = "lbvh-device".parse().unwrap();
         let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let two = [triangle, triangle.map(|v| v + Vec3::Z)];
-        let report = kind.build_for(gpu, &two).unwrap().report;
-        assert_eq!((report.kind, report.host_because), ("lbvh-device", None));
-        for few in [&two[..0], &two[..1], &[[Vec3::NAN; 3], triangle]] {
-            let built = kind.build_for(gpu, few).unwrap();
-            let report = built.report;
-            let host = kind.build(few).unwrap();
-            assert!(
-                report
-                    .host_because
-                    .is_some_and(|cause| cause.contains("fewer than two"))
-            );
-            assert_eq!(report.statistics, host.statistics());
-            let there: Vec<[u32; 4]> = gpu.read(built.texels.buffer().view(), host.texels().len()).unwrap();
-            assert!(there == host.texels());
+        for name in ["lbvh-device", "wide-device"] {
+            let kind: IndexKind = name.parse().unwrap();
+            let report = kind.build_for(gpu, &two).unwrap().report;
+            assert_eq!((report.kind, report.host_because), (name, None));
+            for few in [&two[..0], &two[..1], &[[Vec3::NAN; 3], triangle]] {
+                let built = kind.build_for(gpu, few).unwrap();
+                let report = built.report;
+                let host = kind.build(few).unwrap();
+                assert!(
+                    report
+                        .host_because
+                        .is_some_and(|cause| cause.contains("fewer than two"))
+                );
+                assert_eq!(report.statistics, host.statistics());
+                let there: Vec<[u32; 4]> = gpu.read(built.texels.buffer().view(), host.texels().len()).unwrap();
+                assert!(there == host.texels());
+            }
         }
     });
 }

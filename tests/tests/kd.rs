@@ -1,18 +1,16 @@
 //! Kernels that traverse kd-trees, by every scheme and for both queries, against their Rust twin: hits to the bit, and the work exactly.
-//!
-//! Equality of bits is asked of software devices: Vulkan lets others divide with an error of 2.5 ULP, so there the hits are held to the
-//! f64 test.
 
 use clerestory::Error;
-use clerestory::accel::kd::{KdCaches, KdCounters, KdNode, KdSettings, KdTraversal, KdTree, MAX_BYTE_LEVELS, Scheme};
+use clerestory::accel::kd::{KdCaches, KdNode, KdSettings, KdTree, MAX_BYTE_LEVELS, Scheme};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
-use clerestory::accel::{FINISHED, Hit, Ray, RayIndex};
+use clerestory::accel::{Ray, RayIndex};
 use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::constants::{KD_HEAP_LEVELS, KD_LEAF, KD_STACK_CACHE_BYTES, KD_STACK_CACHE_NONE};
 use clerestory::gpu::{Category, DeviceKind, Gpu};
-use clerestory_hard_cases::{hit_bits, misses, soup_with_rays};
+use clerestory_hard_cases::soup_with_rays;
 use clerestory_tests::shaders::kd_cache_probe;
 use clerestory_tests::shaders::sets::IndexSet;
+use clerestory_tests::traced::{Case, check, check_hits};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
@@ -30,27 +28,18 @@ const fn flags(push_down: bool, short_stack: u32) -> Scheme {
     Scheme::Flags { push_down, short_stack }
 }
 
-struct Case {
-    what: String,
-    triangles: Vec<[Vec3; 3]>,
-    tree: KdTree,
-    rays: Vec<Ray>,
-}
-
-impl Case {
-    fn new(what: &str, triangles: Vec<[Vec3; 3]>, rays: Vec<Ray>, settings: &KdSettings) -> Self {
-        Self {
-            what: what.into(),
-            tree: KdTree::build(&triangles, settings).unwrap(),
-            triangles,
-            rays,
-        }
+fn case(what: &str, triangles: Vec<[Vec3; 3]>, rays: Vec<Ray>, settings: &KdSettings) -> Case<KdTree> {
+    Case {
+        what: what.into(),
+        index: KdTree::build(&triangles, settings).unwrap(),
+        triangles,
+        rays,
     }
 }
 
 /// A triangle across the x axis between each two of `levels` planes, every plane cutting off one: ways of as many inner nodes. Along the axis
 /// rays meet triangles that are in their way, and, beside them, boxes alone.
-fn chain(levels: u32) -> Case {
+fn chain(levels: u32) -> Case<KdTree> {
     let triangles: Vec<[Vec3; 3]> = (0..=levels)
         .map(|i| {
             let x = i as f32 + 0.5;
@@ -83,7 +72,7 @@ fn chain(levels: u32) -> Case {
     Case {
         what: format!("chain of {levels}"),
         triangles,
-        tree,
+        index: tree,
         rays,
     }
 }
@@ -92,12 +81,12 @@ fn soup() -> (Vec<[Vec3; 3]>, Vec<Ray>) {
     soup_with_rays(41, 1500, 1200)
 }
 
-fn cases() -> Vec<Case> {
+fn cases() -> Vec<Case<KdTree>> {
     let default = KdSettings::default();
     let hard = clerestory_hard_cases::all();
     let sets = hard.iter().filter_map(|case| case.rays).flat_map(|rays| rays());
-    let mut cases: Vec<Case> = sets
-        .map(|set| Case::new(&set.what, set.triangles, set.rays, &default))
+    let mut cases: Vec<Case<KdTree>> = sets
+        .map(|set| case(&set.what, set.triangles, set.rays, &default))
         .collect();
     let (triangles, rays) = soup();
     // Deep trees, since tests of triangles seem dear.
@@ -106,73 +95,17 @@ fn cases() -> Vec<Case> {
         leaf_size: 1,
         ..default
     };
-    cases.push(Case::new("soup, deep", triangles.clone(), rays.clone(), &deep));
-    cases.push(Case::new("soup", triangles, rays.clone(), &default));
-    cases.push(Case::new(
+    cases.push(case("soup, deep", triangles.clone(), rays.clone(), &deep));
+    cases.push(case("soup", triangles, rays.clone(), &default));
+    cases.push(case(
         "one leaf",
         vec![[Vec3::ZERO, Vec3::X, Vec3::Y]],
         rays[..40].to_vec(),
         &default,
     ));
-    cases.push(Case::new("nothing", Vec::new(), rays[..40].to_vec(), &default));
+    cases.push(case("nothing", Vec::new(), rays[..40].to_vec(), &default));
     cases.extend([1, 31, 32].map(chain));
     cases
-}
-
-/// Hits and work of the twin, and how often a ray was stopped.
-fn twin(case: &Case, settings: &TraceSettings) -> (Vec<Hit>, KdCounters, u64) {
-    let (mut counters, mut stops) = (KdCounters::default(), 0);
-    let trace = |ray: &Ray| {
-        let mut traversal = match settings.query {
-            Query::Closest => KdTraversal::closest(settings.scheme, ray),
-            Query::Any => KdTraversal::any(settings.scheme, ray),
-        }
-        .with_caches(settings.caches)
-        .unwrap();
-        let quota = u64::from(settings.ray_quota);
-        loop {
-            traversal.run(&case.tree, ray, quota, &mut |_, _| true, &mut counters);
-            if traversal.resume == FINISHED {
-                return traversal.hit;
-            }
-            stops += 1;
-        }
-    };
-    let hits = case.rays.iter().map(trace).collect();
-    (hits, counters, stops)
-}
-
-/// Traces all cases with the same settings, or with as much of their quota as fits a software device's loops: the wider its subgroups, the less. How often
-/// rays were stopped by the quota that was asked for.
-fn check(gpu: &Gpu, cases: &[Case], settings: &TraceSettings) -> u64 {
-    let asked = settings;
-    let exact = gpu.caps().kind == DeviceKind::Cpu;
-    // Kept, so that all share a pipeline.
-    let mut tracers = Vec::new();
-    let mut stopped = 0;
-    for case in cases {
-        let settings = &asked.fitted(gpu.caps(), case.tree.device_traversal());
-        let what = format!("{}, {settings:?}", case.what);
-        let tracer = RayTracer::new(gpu, &case.tree, settings).unwrap();
-        let traced = tracer.trace(&case.rays).unwrap();
-        tracers.push(tracer);
-        if settings.ray_quota == asked.ray_quota {
-            stopped += traced.unfinished;
-        }
-        let (hits, work, stops) = twin(case, settings);
-        for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
-            if exact {
-                assert_eq!(hit_bits(found), hit_bits(expected), "{what}: {ray:?}");
-            } else if settings.query == Query::Closest || !found.is_hit() {
-                assert!(!misses(&case.triangles, ray, found), "{what}: {ray:?}");
-            }
-        }
-        if exact {
-            assert_eq!(traced.kd_work, work, "{what}");
-            assert_eq!(traced.unfinished, stops, "{what}");
-        }
-    }
-    stopped
 }
 
 fn settings(scheme: Scheme, query: Query, ray_quota: u32) -> TraceSettings {
@@ -226,7 +159,7 @@ fn persistent_threads_trace_every_ray_once() {
             execution: Execution::Persistent(threads),
             ..settings(Scheme::Stack, query, ray_quota)
         };
-        let tree = |rays: &[Ray]| Case::new("soup", triangles.clone(), rays.to_vec(), &KdSettings::default());
+        let tree = |rays: &[Ray]| case("soup", triangles.clone(), rays.to_vec(), &KdSettings::default());
         let cases = [0, 1, 31, 32, 33, rays.len()].map(|count| tree(&rays[..count]));
         check(gpu, &cases, &with_queue(Query::Closest, 1000));
         assert!(check(gpu, &cases[5..], &with_queue(Query::Any, SMALL_QUOTA)) > 0);
@@ -328,23 +261,23 @@ fn boxes_of_top(tree: &KdTree, places: usize) -> Vec<Option<[Vec3; 2]>> {
 fn caches_hold_the_top_of_the_tree_and_are_what_is_read() {
     const MARK: u32 = 0x0010_0100;
     with_gpu(|gpu| {
-        let cases: Vec<Case> = cases()
+        let cases: Vec<Case<KdTree>> = cases()
             .into_iter()
             .filter(|case| case.what.starts_with("soup") || case.what.starts_with("chain") || case.what == "one leaf")
             .collect();
-        assert!(cases.iter().any(|case| case.tree.nodes().len() > 2 << KD_HEAP_LEVELS));
+        assert!(cases.iter().any(|case| case.index.nodes().len() > 2 << KD_HEAP_LEVELS));
         let with_boxes = [1, 3, MAX_BYTE_LEVELS].map(|levels| (levels, true));
         let without = [1, 3, MAX_BYTE_LEVELS, KD_HEAP_LEVELS].map(|levels| (levels, false));
         for (levels, boxes_too) in with_boxes.into_iter().chain(without) {
             for case in &cases {
                 let what = format!("{}, {levels} levels, boxes: {boxes_too}", case.what);
-                let (nodes, boxes) = cached(gpu, &case.tree, levels, boxes_too, MARK);
-                for (place, (found, node)) in nodes.iter().zip(case.tree.nodes()).enumerate() {
+                let (nodes, boxes) = cached(gpu, &case.index, levels, boxes_too, MARK);
+                for (place, (found, node)) in nodes.iter().zip(case.index.nodes()).enumerate() {
                     let mark = if place < 1 << levels { MARK } else { 0 };
                     let expected = [node.value, node.word].map(|word| word.wrapping_add(mark));
                     assert_eq!([found.value, found.word], expected, "{what}: node {place}");
                 }
-                let expected = boxes_of_top(&case.tree, boxes.len());
+                let expected = boxes_of_top(&case.index, boxes.len());
                 for (place, (found, expected)) in boxes.iter().zip(&expected).enumerate() {
                     assert!(
                         expected.is_none_or(|expected| expected == *found),
@@ -378,7 +311,7 @@ fn rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none() {
             caches: KdCaches::SPECULATION,
             ..settings(Scheme::Stack, Query::Closest, 1000)
         };
-        let tracer = RayTracer::new(gpu, &case.tree, &settings).unwrap();
+        let tracer = RayTracer::new(gpu, &case.index, &settings).unwrap();
         // Rays that go against the axis, of a subgroup's.
         for longs in [0, 1, lanes] {
             let rays: Vec<Ray> = (0..lanes).map(|lane| if lane < longs { long } else { short }).collect();
@@ -406,7 +339,6 @@ fn rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none() {
 #[test]
 fn votes_change_no_hit() {
     with_gpu(|gpu| {
-        let exact = gpu.caps().kind == DeviceKind::Cpu;
         let cases = cases();
         let threads = PersistentThreads {
             groups: 3,
@@ -427,31 +359,19 @@ fn votes_change_no_hit() {
                 ..settings(Scheme::Stack, query, ray_quota)
             };
             if !gpu.caps().subgroup.vote {
-                let refused = RayTracer::new(gpu, &cases[0].tree, &settings);
+                let refused = RayTracer::new(gpu, &cases[0].index, &settings);
                 assert!(matches!(refused, Err(Error::MissingFeature { .. })), "{refused:?}");
                 continue;
             }
             let mut tracers = Vec::new();
             for case in &cases {
-                let settings = settings.fitted(gpu.caps(), case.tree.device_traversal());
-                let tracer = RayTracer::new(gpu, &case.tree, &settings).unwrap();
+                let settings = settings.fitted(gpu.caps(), case.index.device_traversal());
+                let tracer = RayTracer::new(gpu, &case.index, &settings).unwrap();
                 let traced = tracer.trace(&case.rays).unwrap();
                 tracers.push(tracer);
                 stopped += traced.unfinished;
                 // Of a subgroup of one ray; its work is not that of the device's.
-                let (hits, ..) = twin(case, &settings);
-                for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
-                    if exact {
-                        assert_eq!(
-                            hit_bits(found),
-                            hit_bits(expected),
-                            "{}, {settings:?}: {ray:?}",
-                            case.what
-                        );
-                    } else if query == Query::Closest || !found.is_hit() {
-                        assert!(!misses(&case.triangles, ray, found), "{}: {ray:?}", case.what);
-                    }
-                }
+                check_hits(gpu, case, &settings, &traced.hits);
             }
         }
         assert!(!gpu.caps().subgroup.vote || stopped > 1000, "{stopped} stops");
@@ -462,11 +382,11 @@ fn votes_change_no_hit() {
 fn settings_that_could_lose_rays_are_refused_and_can_be_fitted() {
     with_gpu(|gpu| {
         let (triangles, rays) = soup();
-        let case = Case::new("soup", triangles, rays, &KdSettings::default());
-        let traversal = case.tree.device_traversal();
+        let case = case("soup", triangles, rays, &KdSettings::default());
+        let traversal = case.index.device_traversal();
         for settings in [TraceSettings::ray_per_thread(), TraceSettings::persistent(gpu.caps())] {
             if gpu.caps().kind == DeviceKind::Cpu {
-                let refused = RayTracer::new(gpu, &case.tree, &settings);
+                let refused = RayTracer::new(gpu, &case.index, &settings);
                 assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
             }
             let fitted = TraceSettings {
@@ -502,7 +422,7 @@ fn settings_that_could_lose_rays_are_refused_and_can_be_fitted() {
                 ..persistent
             },
         ] {
-            let refused = RayTracer::new(gpu, &case.tree, &wrong);
+            let refused = RayTracer::new(gpu, &case.index, &wrong);
             assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
         }
     });

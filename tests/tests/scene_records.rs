@@ -38,6 +38,7 @@ fn kernels_load_every_word_of_a_record() {
         wanted.light_node.node_count = 1;
         let trails: [u32; 8] = std::array::from_fn(|light| 700 + light as u32);
         wanted.trails = [trails[0], trails[5]];
+        wanted.instance = numbered(801);
         let triangles = texels(gpu, wanted.triangle);
         let materials = texels(gpu, wanted.material);
         let textures = texels(gpu, wanted.texture_record);
@@ -52,6 +53,7 @@ fn kernels_load_every_word_of_a_record() {
         let tree = gpu
             .texels_with("tree", Category::Staging, format, &tree.bytes())
             .unwrap();
+        let instance = texels(gpu, wanted.instance);
         let no_words = texels(gpu, [0u32; 4]);
         let no_floats = gpu
             .texels_with("none", Category::Staging, vk::Format::R32_SFLOAT, &[0.0f32])
@@ -71,6 +73,7 @@ fn kernels_load_every_word_of_a_record() {
             scene_environment: &environment,
             scene_albedo_table: &no_floats,
             scene_light_tree: &tree,
+            scene_instances: &instance,
         };
         let media = MediaSet {
             media_records: &medium,

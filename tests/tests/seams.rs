@@ -6,6 +6,7 @@
 
 use clerestory::accel::lbvh::{LbvhBuilder, LbvhSettings};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
+use clerestory::accel::wide::{WideBuilder, WideSettings};
 use clerestory::accel::{DeviceTraversal, IndexKind, IndexOnDevice, Ray, RayIndex};
 use clerestory::gpu::Gpu;
 use clerestory_tests::random::Random;
@@ -259,7 +260,8 @@ fn check_host(count: usize, part: usize) {
 fn check_device(gpu: &Gpu, count: usize, part: usize) {
     let mut random = Random(82);
     // Kept, so that all builds and all traces share their pipelines.
-    let _builder = LbvhBuilder::new(gpu, &LbvhSettings::default()).unwrap();
+    let _binary = LbvhBuilder::new(gpu, &LbvhSettings::default()).unwrap();
+    let _wide = WideBuilder::new(gpu, &WideSettings::default()).unwrap();
     let mut kept = Vec::new();
     for mesh in meshes() {
         let mut all = Vec::new();

@@ -1,18 +1,16 @@
 //! Kernels that traverse wide hierarchies, for both queries, against their Rust twin: hits to the bit, and the work exactly; and against the
-//! binary hierarchy.
-//!
-//! Equality of bits with the twin is asked of software devices: Vulkan lets others divide with an error of 2.5 ULP, so there the hits are held to the
-//! f64 test.
+//! binary hierarchy. What the device builds and refits, against the host.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
+use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
-use clerestory::accel::wide::{WideBvh, WideSettings, WideTraversal};
-use clerestory::accel::{FINISHED, Hit, Ray, RayIndex, TraversalCounters};
-use clerestory::gpu::{DeviceKind, Gpu};
-use clerestory::scene::{Instance, Scene};
+use clerestory::accel::wide::{LEAF_SIZE, WideBuilder, WideBvh, WideRefitter, WideSettings, refit};
+use clerestory::accel::{Ray, RayIndex};
+use clerestory::gpu::DeviceKind;
 use clerestory_hard_cases::{hit_bits, misses, soup_with_rays};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::builtin;
+use clerestory_tests::traced::{Case, check};
 use clerestory_tests::with_gpu;
 use glam::Vec3;
 
@@ -21,21 +19,12 @@ const QUOTA: u32 = 3000;
 /// Stops many.
 const SMALL_QUOTA: u32 = 40;
 
-struct Case {
-    what: String,
-    triangles: Vec<[Vec3; 3]>,
-    bvh: WideBvh,
-    rays: Vec<Ray>,
-}
-
-impl Case {
-    fn new(what: &str, triangles: Vec<[Vec3; 3]>, rays: Vec<Ray>) -> Self {
-        Self {
-            what: what.into(),
-            bvh: WideBvh::build(&triangles, &WideSettings::default()).unwrap(),
-            triangles,
-            rays,
-        }
+fn case(what: &str, triangles: Vec<[Vec3; 3]>, rays: Vec<Ray>) -> Case<WideBvh> {
+    Case {
+        what: what.into(),
+        index: WideBvh::build(&triangles, &WideSettings::default()).unwrap(),
+        triangles,
+        rays,
     }
 }
 
@@ -43,70 +32,16 @@ fn soup() -> (Vec<[Vec3; 3]>, Vec<Ray>) {
     soup_with_rays(51, 3000, 2048)
 }
 
-fn cases() -> Vec<Case> {
+fn cases() -> Vec<Case<WideBvh>> {
     let hard = clerestory_hard_cases::all();
     let sets = hard.iter().filter_map(|case| case.rays).flat_map(|rays| rays());
-    let mut cases: Vec<Case> = sets.map(|set| Case::new(&set.what, set.triangles, set.rays)).collect();
+    let mut cases: Vec<_> = sets.map(|set| case(&set.what, set.triangles, set.rays)).collect();
     let (triangles, rays) = soup();
     let few = rays[..40].to_vec();
-    cases.push(Case::new(
-        "one triangle",
-        vec![[Vec3::ZERO, Vec3::X, Vec3::Y]],
-        few.clone(),
-    ));
-    cases.push(Case::new("nothing", Vec::new(), few));
-    cases.push(Case::new("soup", triangles, rays));
+    cases.push(case("one triangle", vec![[Vec3::ZERO, Vec3::X, Vec3::Y]], few.clone()));
+    cases.push(case("nothing", Vec::new(), few));
+    cases.push(case("soup", triangles, rays));
     cases
-}
-
-/// Hits and work of the twin, and how often a ray was stopped.
-fn twin(case: &Case, settings: &TraceSettings) -> (Vec<Hit>, TraversalCounters, u64) {
-    let (mut counters, mut stops) = (TraversalCounters::default(), 0);
-    let trace = |ray: &Ray| {
-        let mut traversal = match settings.query {
-            Query::Closest => WideTraversal::closest(ray),
-            Query::Any => WideTraversal::any(ray),
-        };
-        let quota = u64::from(settings.ray_quota);
-        loop {
-            traversal.run(&case.bvh, ray, quota, &mut |_, _| true, &mut counters);
-            if traversal.resume == FINISHED {
-                return traversal.hit;
-            }
-            stops += 1;
-        }
-    };
-    let hits = case.rays.iter().map(trace).collect();
-    (hits, counters, stops)
-}
-
-/// Traces all cases with the same settings. How often rays were stopped.
-fn check(gpu: &Gpu, cases: &[Case], asked: &TraceSettings) -> u64 {
-    let exact = gpu.caps().kind == DeviceKind::Cpu;
-    // Kept, so that all share a pipeline.
-    let mut tracers = Vec::new();
-    let mut stopped = 0;
-    for case in cases {
-        let settings = &asked.fitted(gpu.caps(), case.bvh.device_traversal());
-        let what = format!("{}, {settings:?}", case.what);
-        let tracer = RayTracer::new(gpu, &case.bvh, settings).unwrap();
-        let traced = tracer.trace(&case.rays).unwrap();
-        tracers.push(tracer);
-        stopped += traced.unfinished;
-        let (hits, work, stops) = twin(case, settings);
-        for ((ray, found), expected) in case.rays.iter().zip(&traced.hits).zip(&hits) {
-            if exact {
-                assert_eq!(hit_bits(found), hit_bits(expected), "{what}: {ray:?}");
-            } else if settings.query == Query::Closest || !found.is_hit() {
-                assert!(!misses(&case.triangles, ray, found), "{what}: {ray:?}");
-            }
-        }
-        if exact {
-            assert_eq!(traced.work, work, "{what}");
-            assert_eq!(traced.unfinished, stops, "{what}");
-        }
-    }
-    stopped
 }
 
 fn settings(query: Query, ray_quota: u32) -> TraceSettings {
@@ -153,7 +88,7 @@ fn persistent_threads_trace_every_ray_once() {
             execution: Execution::Persistent(threads),
             ..settings(Query::Closest, QUOTA)
         };
-        check(gpu, &[Case::new("soup", triangles, rays)], &asked);
+        check(gpu, &[case("soup", triangles, rays)], &asked);
     });
 }
 
@@ -169,20 +104,6 @@ fn quotas_that_could_lose_rays_are_refused() {
         assert!(RayTracer::new(gpu, &bvh, &fitted).is_ok());
         assert!(!refused || fitted.ray_quota > 1000, "{fitted:?}");
     });
-}
-
-fn triangles_of(scene: &Scene) -> Vec<[Vec3; 3]> {
-    let of_instance = |instance: &Instance| {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let place = |i: u32| {
-            instance
-                .transform
-                .transform_point3(mesh.positions[i as usize].as_dvec3())
-                .as_vec3()
-        };
-        mesh.triangles.iter().map(|t| t.map(place)).collect::<Vec<_>>()
-    };
-    scene.instances.iter().flat_map(of_instance).collect()
 }
 
 /// Rays of a scene: half from its camera's place to triangles, half from triangles in random directions.
@@ -215,7 +136,7 @@ fn kernels_give_a_million_rays_the_hits_of_the_binary_tree() {
             ("builtin:sphere-flake?depth=2&frequency=4", 300_000),
         ] {
             let scene = builtin(address);
-            let triangles = triangles_of(&scene);
+            let triangles = scene.triangles().map(|(triangle, _)| triangle).collect::<Vec<_>>();
             let eye = scene.cameras[0].transform.translation.as_vec3();
             let rays = rays_among(&triangles, eye, count, &mut random);
             let binary = Bvh2::build(&triangles, &Bvh2Settings::default()).unwrap();
@@ -232,6 +153,188 @@ fn kernels_give_a_million_rays_the_hits_of_the_binary_tree() {
             assert!(met > count / 4, "{address}: {met} hits");
             for ((ray, expected), found) in rays.iter().zip(&expected).zip(&found) {
                 assert_eq!(hit_bits(expected), hit_bits(found), "{address}: {ray:?}");
+            }
+        }
+    });
+}
+
+/// Settings of what the device builds, and the host likewise.
+fn on_device(code_bits: u32, triangle_cost: f32) -> WideSettings {
+    WideSettings {
+        binary: LbvhSettings {
+            code_bits,
+            leaf_size: LEAF_SIZE,
+            quality: BuildQuality::Fast,
+            ..LbvhSettings::default()
+        },
+        triangle_cost,
+    }
+}
+
+/// Triangles of the hard cases, and of soups with some that rays cannot meet.
+fn sets_of_triangles() -> Vec<(String, Vec<[Vec3; 3]>)> {
+    let mut random = Random(53);
+    let mut sets: Vec<_> = cases().into_iter().map(|case| (case.what, case.triangles)).collect();
+    for count in [2, 3, 4, 9, 64, 1000, 20_000] {
+        let mut soup: Vec<[Vec3; 3]> = (0..count)
+            .map(|_| {
+                let centre = 10.0 * random.vector();
+                [0; 3].map(|_| centre + 0.3 * random.vector())
+            })
+            .collect();
+        if count > 100 {
+            soup[7][1].z = f32::NAN;
+            soup[8][1] = soup[8][0];
+            soup[9].iter_mut().for_each(|v| v.x = -0.0);
+            soup[11] = soup[10];
+        }
+        sets.push((format!("soup of {count}"), soup));
+    }
+    sets
+}
+
+fn assert_same(found: &WideBvh, expected: &WideBvh, what: &str) {
+    let (nodes, others) = (found.nodes(), expected.nodes());
+    assert_eq!(nodes.len(), others.len(), "{what}");
+    for (place, (node, other)) in nodes.iter().zip(others).enumerate() {
+        assert_eq!(node, other, "{what}: node {place}");
+    }
+    for (place, (texel, other)) in found.texels().iter().zip(expected.texels()).enumerate() {
+        assert_eq!(texel, other, "{what}: texel {place}, of {} nodes", nodes.len());
+    }
+    assert_eq!(found.texels().len(), expected.texels().len(), "{what}");
+    assert_eq!(found.statistics(), expected.statistics(), "{what}");
+}
+
+#[test]
+fn device_builds_are_the_twins() {
+    with_gpu(|gpu| {
+        let sets = sets_of_triangles();
+        for settings in [on_device(30, 0.4), on_device(63, 2.0)] {
+            let builder = WideBuilder::new(gpu, &settings).unwrap();
+            for (what, triangles) in &sets {
+                let build = builder.build(triangles).unwrap();
+                let host = WideBvh::build(triangles, &settings).unwrap();
+                assert_same(&build.index, &host, what);
+                let Some(resident) = builder.build_resident(triangles).unwrap() else {
+                    assert!(host.statistics().triangles < 2, "{what}");
+                    continue;
+                };
+                for stage in ["costs", "nodes"] {
+                    assert_eq!(build.timings.count(&format!("wide: {stage}")), 1, "{what}: {stage}");
+                }
+                let texels = host.texels();
+                let there: Vec<[u32; 4]> = gpu.read(resident.texels.buffer().view(), texels.len()).unwrap();
+                assert!(there == texels, "{what}");
+                let mut statistics = resident.statistics;
+                assert!(statistics.bytes >= host.statistics().bytes, "{what}");
+                statistics.bytes = host.statistics().bytes;
+                assert_eq!(statistics, host.statistics(), "{what}");
+            }
+        }
+    });
+}
+
+#[test]
+fn host_trees_are_collapsed_by_the_device_as_by_the_host() {
+    with_gpu(|gpu| {
+        let settings = WideSettings::default();
+        let builder = WideBuilder::new(gpu, &settings).unwrap();
+        let binned = |leaf_size| Bvh2Settings {
+            leaf_size,
+            ..Bvh2Settings::default()
+        };
+        for (what, triangles) in &sets_of_triangles() {
+            let trees = [
+                lbvh::build(triangles, &settings.binary).unwrap(),
+                Bvh2::build(triangles, &binned(1)).unwrap(),
+            ];
+            for tree in trees {
+                let device = builder.collapse(&tree).unwrap();
+                assert_same(&device.index, &WideBvh::collapse(&tree, &settings).unwrap(), what);
+            }
+        }
+        let heap = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 40];
+        let large = Bvh2::build(&heap, &binned(8)).unwrap();
+        assert!(builder.collapse(&large).is_err());
+        assert!(builder.buffers(1).is_err());
+    });
+}
+
+#[test]
+fn a_build_and_rays_go_into_one_submission() {
+    with_gpu(|gpu| {
+        let (triangles, rays) = soup();
+        let of_device = on_device(30, 0.4);
+        let builder = WideBuilder::new(gpu, &of_device).unwrap();
+        let count = triangles.len() as u32;
+        let binary = builder.binary().buffers(count).unwrap();
+        let buffers = builder.buffers(count).unwrap();
+        let indices: Vec<u32> = (0..count).collect();
+        gpu.upload(&binary.corners, 0, &triangles).unwrap();
+        gpu.upload(&binary.indices, 0, &indices).unwrap();
+        let mut recorder = gpu.recorder("wide").unwrap();
+        builder.record(&mut recorder, &binary, &buffers).unwrap();
+        recorder.submit().unwrap().wait().unwrap();
+        let host = WideBvh::build(&triangles, &of_device).unwrap();
+        let asked = settings(Query::Closest, QUOTA).fitted(gpu.caps(), host.device_traversal());
+        let tracer = RayTracer::with_texels(gpu, buffers.texels.clone(), host.device_traversal(), &asked).unwrap();
+        let hits = tracer.trace(&rays).unwrap().hits;
+        for (ray, hit) in rays.iter().zip(&hits) {
+            assert!(!misses(&triangles, ray, hit), "{ray:?}");
+        }
+        let texels: Vec<[u32; 4]> = gpu.read(buffers.texels.buffer().view(), host.texels().len()).unwrap();
+        assert!(texels == host.texels());
+        let few = builder.buffers(count - 1).unwrap();
+        let mut recorder = gpu.recorder("wide").unwrap();
+        assert!(builder.record(&mut recorder, &binary, &few).is_err());
+    });
+}
+
+/// What is moved by up to a twentieth of its size, some of it to where it has no area.
+fn moved(triangles: &[[Vec3; 3]], random: &mut Random) -> Vec<[Vec3; 3]> {
+    let places = triangles.iter().flatten().filter(|v| v.abs().max_element() < 1e9);
+    let size = places.fold(0.0f32, |size, v| size.max(v.abs().max_element()));
+    let mut triangles = triangles.to_vec();
+    for (i, triangle) in triangles.iter_mut().enumerate() {
+        let shift = 0.05 * size * random.vector();
+        triangle
+            .iter_mut()
+            .for_each(|v| *v = (*v + shift).clamp(Vec3::splat(-size), Vec3::splat(size)));
+        if i % 30 == 4 {
+            triangle[1] = triangle[0];
+        }
+    }
+    triangles
+}
+
+#[test]
+fn device_refits_are_the_twins() {
+    with_gpu(|gpu| {
+        let mut random = Random(54);
+        let refitter = WideRefitter::new(gpu).unwrap();
+        let builder = WideBuilder::new(gpu, &on_device(30, 0.4)).unwrap();
+        for (what, triangles) in &sets_of_triangles() {
+            let before = WideBvh::build(triangles, &WideSettings::default()).unwrap();
+            let there = refitter.upload(&before).unwrap();
+            assert!(there.bytes() >= before.statistics().bytes, "{what}");
+            let (same, _) = refitter.refit(&there, &before, triangles).unwrap();
+            assert_same(&same, &before, what);
+            // Twice, since a refit begins from what the last one left.
+            for _ in 0..2 {
+                let triangles = moved(triangles, &mut random);
+                let (device, _) = refitter.refit(&there, &before, &triangles).unwrap();
+                assert_same(&device, &refit(&before, &triangles).unwrap(), what);
+            }
+            if let Some(resident) = builder.build_resident(triangles).unwrap() {
+                let before = builder.build(triangles).unwrap().index;
+                let there = refitter.resident(&resident).unwrap();
+                let triangles = moved(triangles, &mut random);
+                let (device, _) = refitter.refit(&there, &before, &triangles).unwrap();
+                assert_same(&device, &refit(&before, &triangles).unwrap(), what);
+            }
+            if !triangles.is_empty() {
+                assert!(refitter.refit(&there, &before, &triangles[1..]).is_err(), "{what}");
             }
         }
     });

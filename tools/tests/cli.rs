@@ -358,8 +358,8 @@ fn indexes_are_compared_also_where_the_device_cannot_build_one() -> Tested {
     let output = succeed(&[&["index", "--json", "--repeat", "2", "--rays", "100"][..], &scenes].concat())?;
     let report = json(&output.stdout)?;
     let rows = report["indexes"].as_array().map_or(0, Vec::len);
-    // Seven of the host for each scene, and one of the device.
-    assert_eq!(rows, 15, "{}", said(&output));
+    // Eight of the host for each scene, and one of the device.
+    assert_eq!(rows, 17, "{}", said(&output));
     let skipped = report["skipped"].as_array().cloned().unwrap_or_default();
     assert_eq!(skipped.len(), 1);
     assert_eq!(skipped[0]["index"], "lbvh, fast, device");
@@ -617,7 +617,7 @@ fn mistakes_have_their_exit_codes_and_words() -> Tested {
         2,
         &[
             "octree",
-            "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd, wide, driver",
+            "there is: bvh2, lbvh, lbvh-high, lbvh-device, kd, wide, wide-device, two-level, driver, auto",
         ],
     )?;
     refuse(&["render", "-o", "a.jpg"], 2, &[".exr or .png"])?;

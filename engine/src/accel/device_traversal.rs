@@ -17,6 +17,8 @@ pub enum DeviceTraversal {
     },
     /// Wide hierarchies.
     Wide,
+    /// Wide hierarchies of meshes under one over instances.
+    TwoLevel,
     /// The driver's acceleration structure, by ray queries.
     Driver,
 }
@@ -37,6 +39,7 @@ impl DeviceTraversal {
             Self::Bvh2 => constants::INDEX_BVH2,
             Self::Kd { .. } => constants::INDEX_KD,
             Self::Wide => constants::INDEX_WIDE,
+            Self::TwoLevel => constants::INDEX_TWO_LEVEL,
             Self::Driver => constants::INDEX_DRIVER,
         }
     }
@@ -49,6 +52,15 @@ impl DeviceTraversal {
         match self {
             Self::Driver => gpu.ray_query_pipeline(spec),
             _ => gpu.compute_pipeline(spec),
+        }
+    }
+
+    /// The least quota with which a ray that was stopped gets further than where it was: the way back, in two levels with the rounds that go into an
+    /// instance.
+    pub(crate) fn least_quota(self) -> u32 {
+        match self {
+            Self::TwoLevel => 2 * constants::WIDE_MAX_DEPTH + 3 * constants::WIDE_ROUND_ITERATIONS,
+            Self::Bvh2 | Self::Kd { .. } | Self::Wide | Self::Driver => constants::BVH2_MAX_DEPTH + 1,
         }
     }
 
@@ -80,12 +92,26 @@ impl DeviceTraversal {
         (u64::from(quota) + u64::from(last_round + way_back)) * u64::from(lanes)
     }
 
-    /// The quota up to `quota` with which a subgroup's rays stay within `iterations`, for kd-trees and wide hierarchies on software devices; elsewhere `quota`.
+    /// The same in two levels: a candidate that is asked about may take a search among instances, too, and the way back begins with one.
+    pub(crate) fn two_level_iterations(quota: u32, lanes: u32, filters: bool) -> u64 {
+        let round = constants::WIDE_ROUND_ITERATIONS;
+        let search = constants::INSTANCE_SEARCH_STEPS;
+        let triangle = 1 + if filters { round + search } else { 0 };
+        let last_round = round + 1 + constants::WIDE_NODE_TRIANGLES * triangle;
+        let way_back = search + 2 * (constants::WIDE_MAX_DEPTH + 1);
+        (u64::from(quota) + u64::from(last_round + way_back)) * u64::from(lanes)
+    }
+
+    /// The quota up to `quota` with which a subgroup's rays stay within `iterations`, for kd-trees, wide hierarchies and two levels on software devices; elsewhere `quota`.
     /// `filters` says whether kernels ask about candidates.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] where a leaf alone is too long.
     pub(crate) fn quota_within(self, caps: &Caps, quota: u32, iterations: u32, filters: bool) -> Result<u32> {
+        let quota = match self {
+            Self::TwoLevel => quota.max(self.least_quota()),
+            _ => quota,
+        };
         if caps.kind != DeviceKind::Cpu {
             return Ok(quota);
         }
@@ -93,7 +119,16 @@ impl DeviceTraversal {
         let longest_leaf = match self {
             // One loop, with whatever filter; that of ray queries is the driver's own.
             Self::Bvh2 | Self::Driver => return Ok(quota),
-            Self::Wide => return wide_quota_within(quota, u64::from(iterations / lanes), filters),
+            Self::Wide => {
+                let unstopped = Self::wide_iterations(0, 1, filters);
+                let least = unstopped + u64::from(constants::WIDE_MAX_DEPTH);
+                return round_quota_within(quota, u64::from(iterations / lanes), unstopped, least);
+            }
+            Self::TwoLevel => {
+                let unstopped = Self::two_level_iterations(0, 1, filters);
+                let least = unstopped + u64::from(self.least_quota());
+                return round_quota_within(quota, u64::from(iterations / lanes), unstopped, least);
+            }
             Self::Kd { longest_leaf } => longest_leaf,
         };
         let rounds = KdRounds { waits: false, filters };
@@ -112,11 +147,9 @@ impl DeviceTraversal {
     }
 }
 
-/// The quota up to `quota` with which a ray in a wide hierarchy stays within `most` iterations.
-fn wide_quota_within(quota: u32, most: u64, filters: bool) -> Result<u32> {
-    let unstopped = DeviceTraversal::wide_iterations(0, 1, filters);
-    // The way back to a node leaves no less than that node.
-    let least = unstopped + u64::from(constants::WIDE_MAX_DEPTH);
+/// The quota up to `quota` with which a ray in a wide hierarchy or in two levels stays within `most` iterations: `unstopped` are those beside the quota, and with
+/// `least`, which the way back to a node takes, no less than that node is left.
+fn round_quota_within(quota: u32, most: u64, unstopped: u64, least: u64) -> Result<u32> {
     if most <= least {
         return Err(Error::LimitExceeded {
             name: "round of rays in a wide hierarchy".into(),

@@ -12,7 +12,8 @@ use super::bvh2::{Bvh2, Bvh2Settings};
 use super::driver::DriverIndex;
 use super::kd::{KdSettings, KdTree};
 use super::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
-use super::wide::{WideBvh, WideSettings};
+use super::two_level::{MeshGeometry, Placement, TwoLevelBvh};
+use super::wide::{WideBuilder, WideBvh, WideSettings};
 use super::{BuildStages, DeviceTraversal, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::{BindingSet, BoundResource};
@@ -21,9 +22,9 @@ use crate::gpu::{AccelerationStructure, Caps, Category, Gpu, TexelView};
 use crate::{Error, Result};
 use glam::Vec3;
 
-/// A ray index that the path tracer can traverse, with the settings of its build. The wide hierarchy by default, whose rays are the fastest.
+/// A ray index that the path tracer can traverse, with the settings of its build.
 ///
-/// As text, by [`FromStr`] and [`Display`](fmt::Display), it is one of [`IndexKind::NAMES`] with default settings.
+/// As text, by [`FromStr`] and [`Display`](fmt::Display), it is one of [`IndexKind::NAMES`] or [`IndexKind::AUTOMATIC`], with default settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IndexKind {
     /// Binary hierarchy by the binned surface area heuristic.
@@ -37,20 +38,40 @@ pub enum IndexKind {
     Kd(KdSettings),
     /// Eight children a node, compressed, made of the optimised linear hierarchy.
     Wide(WideSettings),
+    /// The same made of the linear hierarchy as its codes spell it, both by the device where a scene is uploaded, and left there.
+    WideOnDevice(WideSettings),
+    /// The same for each mesh, and one over the instances that place them: a scene is kept as it is described, where the others flatten it.
+    TwoLevel(WideSettings),
+    /// One of both: two levels where a scene needs much less memory with them or would not fit without, and the wide hierarchy elsewhere, whose rays are
+    /// faster ([`GpuScene::with_index`](crate::transport::GpuScene::with_index) has the rule). The default.
+    Automatic(WideSettings),
     /// The driver's acceleration structure, on devices with ray queries.
     Driver,
 }
 
 impl Default for IndexKind {
     fn default() -> Self {
-        Self::Wide(WideSettings::default())
+        Self::Automatic(WideSettings::default())
     }
 }
 
 impl IndexKind {
-    /// All names: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
-    /// the device, the kd-tree, the wide hierarchy, and the driver's acceleration structure.
-    pub const NAMES: [&'static str; 7] = ["bvh2", "lbvh", "lbvh-high", "lbvh-device", "kd", "wide", "driver"];
+    /// The names of all that can be built: the binned heuristic, the linear hierarchy as its codes spell it, the same optimised, the former built by
+    /// the device, the kd-tree, the wide hierarchy, one built by the device, two levels of it, and the driver's acceleration structure.
+    pub const NAMES: [&'static str; 9] = [
+        "bvh2",
+        "lbvh",
+        "lbvh-high",
+        "lbvh-device",
+        "kd",
+        "wide",
+        "wide-device",
+        "two-level",
+        "driver",
+    ];
+
+    /// The name of the choice between the wide hierarchy and two levels of it.
+    pub const AUTOMATIC: &'static str = "auto";
 
     /// The linear hierarchy with default settings.
     pub fn lbvh(quality: BuildQuality) -> Self {
@@ -60,7 +81,7 @@ impl IndexKind {
         })
     }
 
-    /// One of [`IndexKind::NAMES`].
+    /// One of [`IndexKind::NAMES`], or [`IndexKind::AUTOMATIC`].
     pub fn name(&self) -> &'static str {
         match self {
             Self::Bvh2(_) => "bvh2",
@@ -71,6 +92,9 @@ impl IndexKind {
             Self::LbvhOnDevice(_) => "lbvh-device",
             Self::Kd(_) => "kd",
             Self::Wide(_) => "wide",
+            Self::WideOnDevice(_) => "wide-device",
+            Self::TwoLevel(_) => "two-level",
+            Self::Automatic(_) => Self::AUTOMATIC,
             Self::Driver => "driver",
         }
     }
@@ -84,20 +108,24 @@ impl IndexKind {
     /// place in it. Deterministic whatever the number of threads.
     ///
     /// # Errors
-    /// As [`Bvh2::build`], [`lbvh::build`], [`KdTree::build`] and [`WideBvh::build`]; [`Error::Setting`] for the driver's structure, which a device alone has.
+    /// As [`Bvh2::build`], [`lbvh::build`], [`KdTree::build`], [`WideBvh::build`] and [`TwoLevelBvh::build`]; [`Error::Setting`] for the driver's structure,
+    /// which a device alone has.
     pub fn build(&self, triangles: &[[Vec3; 3]]) -> Result<Box<dyn RayIndex>> {
         Ok(match self {
             Self::Bvh2(settings) => Box::new(Bvh2::build(triangles, settings)?),
             Self::Lbvh(settings) => Box::new(lbvh::build(triangles, settings)?),
-            Self::LbvhOnDevice(settings) => {
-                let settings = LbvhSettings {
-                    quality: BuildQuality::Fast,
-                    ..*settings
-                };
-                Box::new(lbvh::build(triangles, &settings)?)
-            }
+            Self::LbvhOnDevice(settings) => Box::new(lbvh::build(triangles, &as_codes_spell_it(settings))?),
             Self::Kd(settings) => Box::new(KdTree::build(triangles, settings)?),
-            Self::Wide(settings) => Box::new(WideBvh::build(triangles, settings)?),
+            // Triangles alone have no instances.
+            Self::Wide(settings) | Self::Automatic(settings) => Box::new(WideBvh::build(triangles, settings)?),
+            Self::WideOnDevice(settings) => {
+                let binary = as_codes_spell_it(&settings.binary);
+                Box::new(WideBvh::build(triangles, &WideSettings { binary, ..*settings })?)
+            }
+            Self::TwoLevel(settings) => {
+                let mesh = MeshGeometry { triangles, names: None };
+                Box::new(TwoLevelBvh::build(&[mesh], &[Placement::identity(0)], settings)?)
+            }
             Self::Driver => {
                 return Err(Error::setting("index", self, "is built by a device, and no host can"));
             }
@@ -127,10 +155,8 @@ impl IndexKind {
         if *self == Self::Driver {
             let begin = Instant::now();
             let built = DriverIndex::build(gpu, triangles)?;
-            let report = IndexReport {
-                build_ms: 1e3 * begin.elapsed().as_secs_f64(),
-                ..IndexReport::of(self.name(), BuildStages::default(), built.statistics)
-            };
+            let build_ms = 1e3 * begin.elapsed().as_secs_f64();
+            let report = IndexReport::of(self.name(), build_ms, BuildStages::default(), built.statistics);
             return Ok(IndexOnDevice {
                 texels: built.triangles,
                 structure: Some(built.structure),
@@ -139,38 +165,42 @@ impl IndexKind {
             });
         }
         let mut fallback = None;
-        if let Self::LbvhOnDevice(settings) = self {
-            let builder = LbvhBuilder::new(gpu, settings)?;
-            let begin = Instant::now();
-            match builder.build_resident(triangles) {
-                Ok(Some(built)) => {
-                    let report = IndexReport {
-                        build_ms: 1e3 * begin.elapsed().as_secs_f64(),
-                        ..IndexReport::of(self.name(), built.stages, built.statistics)
-                    };
-                    return Ok(IndexOnDevice {
-                        texels: built.quarters,
-                        structure: None,
-                        traversal: DeviceTraversal::Bvh2,
-                        report,
-                    });
-                }
-                Ok(None) => fallback = Some("fewer than two triangles that rays can meet"),
-                // What the build needs is more than what remains of it.
-                Err(Error::LimitExceeded { .. }) => {
-                    fallback = Some("more triangles than the device can bind or dispatch while it builds")
-                }
-                Err(error) => return Err(error),
+        let begin = Instant::now();
+        match self.build_resident(gpu, triangles) {
+            Ok(Resident::Built(texels, traversal, stages, statistics)) => {
+                let build_ms = 1e3 * begin.elapsed().as_secs_f64();
+                return Ok(IndexOnDevice {
+                    texels,
+                    structure: None,
+                    traversal,
+                    report: IndexReport::of(self.name(), build_ms, stages, statistics),
+                });
             }
+            Ok(Resident::OfHosts) => {}
+            Ok(Resident::TooFew) => fallback = Some("fewer than two triangles that rays can meet"),
+            // What the build needs is more than what remains of it.
+            Err(Error::LimitExceeded { .. }) => {
+                fallback = Some("more triangles than the device can bind or dispatch while it builds")
+            }
+            Err(error) => return Err(error),
         }
         let (index, report) = self.build_timed(triangles, folder)?;
-        let format = vk::Format::R32G32B32A32_UINT;
         let host_because = fallback;
-        Ok(IndexOnDevice {
-            texels: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
-            structure: None,
-            traversal: index.device_traversal(),
-            report: IndexReport { host_because, ..report },
+        IndexOnDevice::of(gpu, index.as_ref(), IndexReport { host_because, ..report })
+    }
+
+    /// Builds on the device, where the kind says so.
+    fn build_resident(&self, gpu: &Gpu, triangles: &[[Vec3; 3]]) -> Result<Resident> {
+        Ok(match self {
+            Self::LbvhOnDevice(settings) => match LbvhBuilder::new(gpu, settings)?.build_resident(triangles)? {
+                Some(built) => Resident::Built(built.quarters, DeviceTraversal::Bvh2, built.stages, built.statistics),
+                None => Resident::TooFew,
+            },
+            Self::WideOnDevice(settings) => match WideBuilder::new(gpu, settings)?.build_resident(triangles)? {
+                Some(built) => Resident::Built(built.texels, DeviceTraversal::Wide, built.stages, built.statistics),
+                None => Resident::TooFew,
+            },
+            _ => Resident::OfHosts,
         })
     }
 
@@ -192,12 +222,32 @@ impl IndexKind {
             }
             _ => (self.build(triangles)?, None),
         };
+        let kind = match self {
+            Self::Automatic(_) => index.name(),
+            _ => self.name(),
+        };
+        let build_ms = 1e3 * begin.elapsed().as_secs_f64();
         let report = IndexReport {
-            build_ms: 1e3 * begin.elapsed().as_secs_f64(),
             kept,
-            ..IndexReport::of(self.name(), index.stages(), index.statistics())
+            ..IndexReport::of(kind, build_ms, index.stages(), index.statistics())
         };
         Ok((index, report))
+    }
+}
+
+/// What a device was asked to build.
+enum Resident {
+    Built(TexelView, DeviceTraversal, BuildStages, IndexStatistics),
+    TooFew,
+    /// The kind is built by the host.
+    OfHosts,
+}
+
+/// The settings of the tree that devices build.
+fn as_codes_spell_it(settings: &LbvhSettings) -> LbvhSettings {
+    LbvhSettings {
+        quality: BuildQuality::Fast,
+        ..*settings
     }
 }
 
@@ -220,13 +270,20 @@ impl FromStr for IndexKind {
             Self::LbvhOnDevice(LbvhSettings::default()),
             Self::Kd(KdSettings::default()),
             Self::Wide(WideSettings::default()),
+            Self::WideOnDevice(WideSettings::default()),
+            Self::TwoLevel(WideSettings::default()),
+            Self::Automatic(WideSettings::default()),
             Self::Driver,
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
         .ok_or_else(|| {
             let known = Self::NAMES.join(", ");
-            Error::setting("index", name, format!("is not known; there is: {known}"))
+            Error::setting(
+                "index",
+                name,
+                format!("is not known; there is: {known}, {}", Self::AUTOMATIC),
+            )
         })
     }
 }
@@ -326,12 +383,25 @@ pub struct IndexReport {
     pub statistics: IndexStatistics,
 }
 
+impl IndexOnDevice {
+    /// Uploads an index that the host has built.
+    pub(crate) fn of(gpu: &Gpu, index: &dyn RayIndex, report: IndexReport) -> Result<Self> {
+        let format = vk::Format::R32G32B32A32_UINT;
+        Ok(Self {
+            texels: gpu.texels_with(index.name(), Category::Index, format, index.texels())?,
+            structure: None,
+            traversal: index.device_traversal(),
+            report,
+        })
+    }
+}
+
 impl IndexReport {
-    /// Of a build whose time is not known yet.
-    fn of(kind: &'static str, stages: BuildStages, statistics: IndexStatistics) -> Self {
+    /// Of an index that is what was asked for, built where it was asked for.
+    pub(crate) fn of(kind: &'static str, build_ms: f64, stages: BuildStages, statistics: IndexStatistics) -> Self {
         Self {
             kind,
-            build_ms: 0.0,
+            build_ms,
             stages,
             host_because: None,
             instead_because: None,
@@ -350,7 +420,7 @@ mod tests {
         for name in IndexKind::NAMES {
             assert_eq!(name.parse::<IndexKind>().unwrap().to_string(), name);
         }
-        assert!(IndexKind::NAMES.contains(&IndexKind::default().name()));
+        assert_eq!(IndexKind::AUTOMATIC.parse::<IndexKind>().unwrap(), IndexKind::default());
         for unknown in ["", "BVH2", "lbvh-fast", "bvh2 "] {
             let message = unknown.parse::<IndexKind>().unwrap_err().to_string();
             assert!(message.contains("bvh2, lbvh, lbvh-high"), "{message}");
@@ -367,8 +437,8 @@ mod tests {
             .collect();
         // That of the driver alone no host builds.
         let of_hosts = IndexKind::NAMES.into_iter().filter(|name| *name != "driver");
-        assert_eq!(of_hosts.clone().count(), 6);
-        for (name, builder) in of_hosts.zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide"]) {
+        assert_eq!(of_hosts.clone().count(), 8);
+        for (name, builder) in of_hosts.zip(["bvh2", "lbvh", "lbvh", "lbvh", "kd", "wide", "wide", "two-level"]) {
             let (index, report) = name
                 .parse::<IndexKind>()
                 .unwrap()

@@ -42,6 +42,7 @@ mod stages;
 pub(crate) mod sweep;
 pub mod trace;
 pub mod triangle;
+pub mod two_level;
 pub mod wide;
 pub mod yardstick;
 
@@ -159,6 +160,18 @@ pub struct IndexStatistics {
     pub sah_cost: f64,
     /// Bytes of all buffers.
     pub bytes: u64,
+}
+
+impl IndexStatistics {
+    /// The counts of triangles alone.
+    fn of_triangles(&self) -> Self {
+        Self {
+            triangles: self.triangles,
+            excluded_range: self.excluded_range,
+            excluded_degenerate: self.excluded_degenerate,
+            ..Self::default()
+        }
+    }
 }
 
 /// Exact work counters of a traversal.

@@ -31,6 +31,20 @@ impl BuildStages {
         self.named().iter().map(|(_, ms)| ms).sum()
     }
 
+    /// The sums of both.
+    pub(crate) fn plus(&self, other: &Self) -> Self {
+        Self {
+            triangles: self.triangles + other.triangles,
+            transfer: self.transfer + other.transfer,
+            codes: self.codes + other.codes,
+            sort: self.sort + other.sort,
+            hierarchy: self.hierarchy + other.hierarchy,
+            optimise: self.optimise + other.optimise,
+            layout: self.layout + other.layout,
+            statistics: self.statistics + other.statistics,
+        }
+    }
+
     /// Name and milliseconds of each, in order.
     pub fn named(&self) -> [(&'static str, f64); 8] {
         [

@@ -1,5 +1,5 @@
-//! Wide bounding volume hierarchy: eight children a node in 80 bytes, made of a binary tree, laid out for the kernels, and traversed by a twin of
-//! them.
+//! Wide bounding volume hierarchy: eight children a node in 80 bytes, made of a binary tree on the host or on the device, refitted there, laid out for
+//! the kernels, and traversed by a twin of them.
 //!
 //! Source: H. Ylitie, T. Karras and S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017: nodes with
 //! boxes of 8 bits a plane on a grid of their own (§4.1), the cheapest collapse of a binary tree by dynamic programming (§3.1), children in
@@ -12,15 +12,23 @@
 //! traversal returns exactly what trying all triangles in index order returns.
 
 mod collapse;
+mod device;
+mod device_refit;
+pub(super) mod frame;
 mod grid;
-mod slots;
+pub(super) mod refit;
+pub(super) mod slots;
 pub mod traverse;
 
+pub use device::{ResidentWide, WideBuffers, WideBuild, WideBuilder};
+pub use device_refit::{RefittableWide, WideRefitter};
+pub use refit::refit;
 pub use traverse::WideTraversal;
 
 use super::bvh2::{Bvh2, Bvh2Triangle};
 use super::input::check_range;
 use super::lbvh::{self, LbvhSettings};
+use super::stages::Stopwatch;
 use super::{
     Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
 };
@@ -49,7 +57,8 @@ const _: () = assert!(
     NODE_TEXELS == constants::WIDE_NODE_TEXELS as usize
         && size_of::<Header>() == 16 * constants::WIDE_HEADER_TEXELS as usize
         && size_of::<Bvh2Triangle>() == 16 * constants::WIDE_TRIANGLE_TEXELS as usize
-        && MAX_DEPTH >= super::bvh2::MAX_DEPTH,
+        && MAX_DEPTH >= super::bvh2::MAX_DEPTH
+        && MAX_DEPTH <= constants::WIDE_LEVELS,
     "the kernels have another layout"
 );
 
@@ -172,7 +181,48 @@ impl WideBvh {
     /// [`Error::Setting`] for a cost out of range and for a tree with leaves of more than [`LEAF_SIZE`] triangles.
     pub fn collapse(binary: &Bvh2, settings: &WideSettings) -> Result<Self> {
         check_triangle_cost(settings)?;
-        collapse::collapse(binary, settings.triangle_cost)
+        collapse::collapse(binary, settings.triangle_cost, SLOTS)
+    }
+
+    /// Nodes and triangles with the header before them, measured; of `statistics` the counts of triangles and the depth are given.
+    fn assembled(
+        nodes: &[WideNode],
+        triangles: &[Bvh2Triangle],
+        bounds: &Aabb,
+        statistics: IndexStatistics,
+        stages: BuildStages,
+    ) -> Self {
+        let header = Header {
+            lower: bounds.lower,
+            triangles: first_triangle_texel(nodes.len()) as u32,
+            upper: bounds.upper,
+            zero: 0,
+        };
+        let mut texels: Vec<[u32; 4]> = Vec::with_capacity(texels_of(nodes.len(), triangles.len()));
+        texels.extend(bytemuck::cast::<Header, [[u32; 4]; 2]>(header));
+        texels.extend_from_slice(bytemuck::cast_slice(nodes));
+        texels.extend_from_slice(bytemuck::cast_slice(triangles));
+        Self::of_texels(texels, nodes.len(), statistics, stages)
+    }
+
+    /// What lies in memory, measured; of `statistics` as for [`WideBvh::assembled`].
+    fn of_texels(texels: Vec<[u32; 4]>, nodes: usize, statistics: IndexStatistics, mut stages: BuildStages) -> Self {
+        let mut watch = Stopwatch::start();
+        let mut index = Self {
+            nodes,
+            texels,
+            statistics,
+            stages,
+        };
+        let (bytes, bounds) = (size_of_val(index.texels.as_slice()), index.bounds());
+        let mut statistics = IndexStatistics {
+            bytes: bytes as u64,
+            ..statistics
+        };
+        measure(index.nodes(), &bounds, &mut statistics);
+        stages.statistics += watch.lap();
+        (index.statistics, index.stages) = (statistics, stages);
+        index
     }
 
     /// Nodes; the root is the first.
@@ -183,8 +233,7 @@ impl WideBvh {
 
     /// Triangles in the order of leaves.
     pub fn triangles(&self) -> &[Bvh2Triangle] {
-        let first = constants::WIDE_HEADER_TEXELS as usize + NODE_TEXELS * self.nodes;
-        bytemuck::cast_slice(&self.texels[first..])
+        bytemuck::cast_slice(&self.texels[first_triangle_texel(self.nodes)..])
     }
 
     /// Box of all triangles; a point where there are none.
@@ -195,6 +244,35 @@ impl WideBvh {
             upper: header.upper,
         }
     }
+}
+
+/// Where triangles begin behind so many nodes.
+fn first_triangle_texel(nodes: usize) -> usize {
+    constants::WIDE_HEADER_TEXELS as usize + NODE_TEXELS * nodes
+}
+
+/// Texels of a tree.
+fn texels_of(nodes: usize, triangles: usize) -> usize {
+    first_triangle_texel(nodes) + constants::WIDE_TRIANGLE_TEXELS as usize * triangles
+}
+
+/// Counts nodes and leaves, and sums the SAH cost of decoded boxes.
+fn measure(nodes: &[WideNode], bounds: &Aabb, statistics: &mut IndexStatistics) {
+    let (mut cost, mut leaves) = (0.0, 0);
+    for node in nodes {
+        for slot in 0..SLOTS {
+            let count = node.leaf(slot).1;
+            let tests = if node.child(slot).is_some() { 1 } else { count };
+            let [lower, upper] = node.bounds(slot);
+            let e = upper - lower;
+            cost += f64::from(tests) * (e.x * e.y + e.y * e.z + e.z * e.x);
+            leaves += u64::from(count > 0);
+        }
+    }
+    let root = bounds.half_area();
+    statistics.nodes = nodes.len() as u64;
+    statistics.leaves = leaves;
+    statistics.sah_cost = if root > 0.0 { 1.0 + cost / root } else { 0.0 };
 }
 
 fn check_triangle_cost(settings: &WideSettings) -> Result<()> {
@@ -240,6 +318,9 @@ impl RayIndex for WideBvh {
 }
 
 #[cfg(test)]
+mod estimates;
+
+#[cfg(test)]
 mod tests;
 
 /// Rows of the catalogue.
@@ -247,26 +328,43 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-WIDE",
     name: "ray index: BVH of eight children a node, in 80 bytes",
     role: Role::Kernel,
-    limits: "Built on the host, from a binary tree, and never refitted; boxes are up to 1/127 of their node's size larger than what they hold.",
+    limits: "Boxes are up to 1/127 of their node's size larger than what they hold; refitting keeps the tree's shape, however things move; the device collapses the tree that codes spell, which is not optimised.",
     sources: &[sources::YLITIE_2017.whole()],
-    shaders: &["shaders/accel/wide.glsl"],
+    shaders: &[
+        "shaders/accel/wide.glsl",
+        "shaders/accel/wide_costs.comp",
+        "shaders/accel/wide_level.comp",
+        "shaders/accel/wide_collapse.comp",
+        "shaders/accel/wide_refit_triangles.comp",
+        "shaders/accel/wide_refit.comp",
+    ],
     tests: &[
         "engine/src/accel/wide/tests.rs::traversal_equals_trying_all_triangles_bit_for_bit",
         "engine/src/accel/wide/tests.rs::decoded_boxes_contain_what_they_are_made_of",
         "engine/src/accel/wide/tests.rs::spans_of_decoded_boxes_keep_their_stated_error",
         "engine/src/accel/wide/tests.rs::stopped_traversals_go_on_without_loss_or_repetition",
         "engine/src/accel/wide/tests.rs::no_other_collapse_costs_less",
+        "engine/src/accel/wide/tests.rs::refitted_trees_have_the_hits_of_all_triangles",
         "tests/tests/wide.rs::kernels_are_their_twins",
         "tests/tests/wide.rs::rays_that_a_quota_stops_go_on",
         "tests/tests/wide.rs::kernels_give_a_million_rays_the_hits_of_the_binary_tree",
+        "tests/tests/wide.rs::device_builds_are_the_twins",
+        "tests/tests/wide.rs::host_trees_are_collapsed_by_the_device_as_by_the_host",
+        "tests/tests/wide.rs::device_refits_are_the_twins",
         "tests/tests/hard_cases.rs::ray_indexes_answer_as_a_search_through_all_triangles",
         "tests/tests/index_choice.rs::pictures_are_the_same_to_the_bit_with_every_index",
     ],
     experiment: "clerestory index --peers",
-    api: &["clerestory::accel::wide::WideBvh"],
+    api: &[
+        "clerestory::accel::wide::WideBvh",
+        "clerestory::accel::wide::refit",
+        "clerestory::accel::wide::WideBuilder",
+        "clerestory::accel::wide::WideRefitter",
+    ],
     settings: &[
         "clerestory::accel::wide::WideSettings",
         "clerestory render --index wide",
+        "clerestory render --index wide-device",
     ],
     ..Row::of(file!())
 }];

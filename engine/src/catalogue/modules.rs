@@ -28,6 +28,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::accel::triangle::ROWS,
     crate::accel::triangle::oracles::ROWS,
     crate::accel::triangle::wald::ROWS,
+    crate::accel::two_level::ROWS,
     crate::accel::wide::ROWS,
     crate::accel::yardstick::left_balanced::ROWS,
     crate::accel::yardstick::voxel_volume::ROWS,

@@ -6,8 +6,9 @@
 use super::{Camera, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
 use crate::{Error, Result};
 
-/// Greatest number of triangles that all instances together may place.
-pub const MAX_PLACED_TRIANGLES: u64 = 1 << 28;
+/// Greatest number of triangles that all instances together may place: hits name each by a number of 32 bits, the last of which names none. What a device
+/// holds of them is less where instances are flattened.
+pub const MAX_PLACED_TRIANGLES: u64 = (1 << 32) - 1;
 /// Most texels along a side of an image: texture records on the device hold both sides in 16 bits each.
 pub const MAX_IMAGE_SIDE: u32 = u16::MAX as u32;
 /// Greatest number of instances.

@@ -12,6 +12,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::check::camera_is_sound;
+use super::placed::placed_again;
 use super::{Camera, Environment, EnvironmentUse, Note, Scene, SceneProfile, builtin, gltf, obj, ply, sidecar};
 use crate::input::{AnyFile, InputFile, InputFiles, InputLimits, Resolver};
 use crate::{Error, Result};
@@ -157,21 +158,11 @@ pub(super) fn stem(path: &Path) -> String {
     stem.strip_suffix(".scene").map(str::to_string).unwrap_or(stem)
 }
 
-/// Bytes that a triangle takes on the device, an index left out.
-const PLACED_TRIANGLE: u64 = 48;
-
 fn model(path: &Path, files: &InputFiles<'_>) -> Result<Scene> {
     let scene = read_model(path, files)?;
-    // Those of a mesh's first instance are in the file; the others cost it nothing.
-    let mut placed = vec![false; scene.meshes.len()];
-    let again = scene.instances.iter().filter_map(|instance| {
-        let mesh = instance.mesh as usize;
-        let is_again = std::mem::replace(placed.get_mut(mesh)?, true);
-        is_again.then(|| scene.meshes[mesh].triangles.len() as u64)
-    });
-    let bytes = PLACED_TRIANGLE.saturating_mul(again.sum());
+    let bytes = placed_again(&scene);
     let counted = files.reserve(bytes, bytes);
-    counted.map_err(|cause| Error::scene(&scene.source, "triangles of all instances", cause))?;
+    counted.map_err(|cause| Error::scene(&scene.source, "instances of meshes that are placed before", cause))?;
     Ok(scene)
 }
 

@@ -13,6 +13,7 @@ pub mod metals;
 mod mtl;
 pub mod normal_map;
 mod obj;
+mod placed;
 pub(crate) mod ply;
 pub(crate) mod profile;
 pub mod sidecar;
@@ -89,6 +90,19 @@ impl Scene {
         });
     }
 
+    /// All instances' triangles in world space, metres, with the index of their material; no material is `None`. Indices of vertices and of meshes must be in
+    /// range, as [`Scene::check`] sees to it.
+    pub fn triangles(&self) -> impl Iterator<Item = ([Vec3; 3], Option<u32>)> + '_ {
+        self.instances.iter().flat_map(|instance| {
+            let mesh = &self.meshes[instance.mesh as usize];
+            let place = |i: u32| {
+                let position = mesh.positions[i as usize].as_dvec3();
+                instance.transform.transform_point3(position).as_vec3()
+            };
+            mesh.triangles.iter().map(move |t| (t.map(place), mesh.material))
+        })
+    }
+
     /// Adds a light without area.
     pub fn add_light(&mut self, name: impl Into<String>, kind: LightKind) {
         self.lights.push(Light {
@@ -154,6 +168,15 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`].
     pub material: Option<u32>,
+}
+
+impl Mesh {
+    /// Least and greatest corner of its vertices in its own space; infinite, and the least above the greatest, without any.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let none = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let with = |[lower, upper]: [Vec3; 2], p: &Vec3| [lower.min(*p), upper.max(*p)];
+        self.positions.iter().fold(none, with)
+    }
 }
 
 /// A mesh placed in the world.

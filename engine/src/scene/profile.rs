@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 use super::{AlphaMode, Image, LightKind, Material, Medium, Phase, Scene, Texture};
 use crate::catalogue::{Role, Row, sources};
@@ -170,18 +170,40 @@ pub struct SceneProfile {
     pub roughness: Option<[f32; 2]>,
     /// World bounds, metres: least and greatest corner; `None` for a scene without vertices.
     pub bounds: Option<[[f64; 3]; 2]>,
+    /// Instances are kept on the device, not flattened: said by [`GpuScene::profile`](crate::transport::GpuScene::profile) alone.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub keeps_instances: bool,
+}
+
+/// A box around the image of a box, a little larger than that.
+fn image_bounds(transform: &DAffine3, lower: Vec3, upper: Vec3) -> [DVec3; 2] {
+    /// More than what f64 rounds a corner by, relative to what makes it.
+    const ROUNDING: f64 = 1e-14;
+    let (lower, upper) = (lower.as_dvec3(), upper.as_dvec3());
+    let centre = transform.transform_point3(0.5 * (lower + upper));
+    let absolute = transform.matrix3.abs();
+    let half = absolute * (0.5 * (upper - lower));
+    let half = half + ROUNDING * (absolute * lower.abs().max(upper.abs()) + transform.translation.abs());
+    [centre - half, centre + half]
 }
 
 impl SceneProfile {
     /// Looks through a scene that passed [`Scene::check`].
     pub fn of(scene: &Scene) -> Self {
         let mut placed = vec![0u64; scene.meshes.len()];
+        let mut boxes = vec![None; scene.meshes.len()];
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for instance in &scene.instances {
             let Some(mesh) = scene.meshes.get(instance.mesh as usize) else {
                 continue;
             };
             placed[instance.mesh as usize] += 1;
+            // What lies within the bounds so far does not change them: of many instances few are looked at vertex by vertex.
+            let [near, far] = *boxes[instance.mesh as usize].get_or_insert_with(|| mesh.bounds());
+            let [near, far] = image_bounds(&instance.transform, near, far);
+            if near.cmpge(low).all() && far.cmple(high).all() {
+                continue;
+            }
             for p in &mesh.positions {
                 let world = instance.transform.transform_point3(p.as_dvec3());
                 low = low.min(world);
@@ -228,6 +250,7 @@ impl SceneProfile {
             has_lens: scene.cameras.iter().any(|c| c.lens_radius > 0.0),
             roughness: None,
             bounds: (low.x <= high.x).then(|| [low.to_array(), high.to_array()]),
+            keeps_instances: false,
         };
         for (mesh, &count) in scene.meshes.iter().zip(&placed).filter(|(_, count)| **count > 0) {
             let triangles = mesh.triangles.len() as u64;

@@ -22,6 +22,7 @@ macro_rules! surface_spec {
             has_vertex_colors: profile.has_vertex_colors,
             has_absorption: profile.has_absorption,
             has_unlit: profile.has_unlit,
+            has_instances: profile.keeps_instances,
             $($further)*
         }
     }};
@@ -30,7 +31,7 @@ pub use surface_spec;
 
 /// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
 /// is off where nothing else is known.
-pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 21] = [
+pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 22] = [
     ("has_metal", METAL_LOBES, "no material is metal"),
     (
         "has_conductor",
@@ -66,6 +67,7 @@ pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 21] = [
         "the scene has few lights",
     ),
     ("has_media", "participating media", "the scene has none"),
+    ("has_instances", "instances", "all are flattened"),
     (
         "has_path_automaton",
         "path expressions",

@@ -70,6 +70,7 @@ impl TracePipelines {
             has_media,
             has_textures,
             has_vertex_colors,
+            has_instances: has_alpha && profile.keeps_instances,
             index_quota,
             index_kind,
             resumes,
@@ -82,6 +83,8 @@ impl TracePipelines {
             has_media,
             has_textures,
             has_vertex_colors,
+            // Boundaries of media are looked up, too.
+            has_instances: (has_alpha || has_media) && profile.keeps_instances,
             has_absorption: has_media && profile.has_absorption,
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,

@@ -89,11 +89,12 @@ void specular_normal_derivatives(Hit hit, Differentials footprint, vec3 normal, 
     dn1 = vec3(0.0);
     dn2 = vec3(0.0);
     if (HAS_SHADING_NORMALS) {
-        SceneTriangle t = load_triangle(hit.triangle);
-        uvec3 v = load_vertices(hit.triangle);
-        vec3 n0 = texelFetch(scene_normals, int(v.x)).xyz;
-        vec3 n1 = texelFetch(scene_normals, int(v.y)).xyz;
-        vec3 n2 = texelFetch(scene_normals, int(v.z)).xyz;
+        SceneInstance at = instance_of(hit.triangle);
+        SceneTriangle t = load_triangle_of(at, hit.triangle);
+        uvec3 v = load_vertices_of(at, hit.triangle);
+        vec3 n0 = load_normal(at, v.x);
+        vec3 n1 = load_normal(at, v.y);
+        vec3 n2 = load_normal(at, v.z);
         normal_derivatives(t.b - t.a, t.c - t.a, n0, n1, n2, hit.barycentrics, footprint, dn1, dn2);
         vec3 interpolated = interpolate(n0, n1, n2, vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics));
         if (dot(interpolated, normal) < 0.0) {

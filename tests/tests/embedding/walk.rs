@@ -120,7 +120,7 @@ fn scene_with_fog() -> Scene {
 
 /// What the walks of the host's technique gather, whose numbers were counted, with so many bounces per submission.
 fn gather(gpu: &Gpu, scene: &Arc<GpuScene>, bounces: usize) -> Vec<[f32; 3]> {
-    let start = gpu.compute_pipeline::<walk_start::Kernel>(&()).unwrap();
+    let start = gpu.compute_pipeline::<walk_start::Kernel>(&Default::default()).unwrap();
     let has_media = scene.profile().media.any();
     let spec = surface_spec!(walk_sky_light, scene, {
         has_alpha: false,

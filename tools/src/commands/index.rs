@@ -8,7 +8,7 @@ use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::kd::{KdSettings, KdTree};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhBuilder, LbvhSettings};
 use clerestory::accel::wide::{WideBvh, WideSettings};
-use clerestory::accel::{BuildStages, Ray, RayIndex, TraversalCounters};
+use clerestory::accel::{BuildStages, IndexKind, Ray, RayIndex, TraversalCounters};
 use clerestory::scene::Scene;
 use clerestory::{Error, Result, scene};
 use clerestory_tools::random::Random;
@@ -124,7 +124,7 @@ const KD: &str = "kd";
 type Build = fn(&[[Vec3; 3]]) -> Result<Box<dyn RayIndex>>;
 
 /// The indexes, the one that others are compared with first.
-const INDEXES: [(&str, Build); 7] = [
+const INDEXES: [(&str, Build); 8] = [
     ("bvh2, binned", |t| {
         Ok(Box::new(Bvh2::build(t, &Bvh2Settings::default())?))
     }),
@@ -138,6 +138,10 @@ const INDEXES: [(&str, Build); 7] = [
     }),
     (KD, |t| Ok(Box::new(KdTree::build(t, &KdSettings::default())?))),
     ("wide", |t| Ok(Box::new(WideBvh::build(t, &WideSettings::default())?))),
+    // What the level above costs where there is nothing to share.
+    ("two-level, one instance", |t| {
+        IndexKind::TwoLevel(WideSettings::default()).build(t)
+    }),
 ];
 
 fn fast(code_bits: u32) -> LbvhSettings {

@@ -111,8 +111,8 @@ pub struct Arguments {
     /// least. The picture stays unbiased. Below 8 samples per pixel it is the picture without.
     #[arg(long, value_enum, value_name = "ERROR", num_args = 0..=1, require_equals = true, default_missing_value = "relative")]
     adaptive: Option<Adaptive>,
-    /// Ray index: bvh2 by binned SAH, lbvh along the Morton curve (shortest build, slower rays), lbvh-high optimised, lbvh-device like lbvh but built by the device, kd a kd-tree (longest build), wide eight children a node, made of lbvh-high (the fastest rays), driver the driver's acceleration structure by ray queries (where `clerestory info` says that it is offered). The picture is the same with each
-    #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd|wide|driver", default_value_t, value_parser = parse_index)]
+    /// Ray index: bvh2 by binned SAH, lbvh along the Morton curve (shortest build, slower rays), lbvh-high optimised, lbvh-device like lbvh but built by the device, kd a kd-tree (longest build), wide eight children a node, made of lbvh-high (the fastest rays), wide-device the same made of lbvh-device by the device, two-level a wide one for each mesh under one over its instances (the least memory), driver the driver's acceleration structure by ray queries (where `clerestory info` says that it is offered), auto two-level where that needs much less memory or all else would not fit, else wide. The picture is the same with each, but for rounding with two-level
+    #[arg(long, value_name = "bvh2|lbvh|lbvh-high|lbvh-device|kd|wide|wide-device|two-level|driver|auto", default_value_t, value_parser = parse_index)]
     index: IndexKind,
     /// With --index kd: folder that keeps kd-trees; a tree over the same triangles is read from there instead of being built again. A file there is trusted with how long rays take, not with the picture: what is damaged, or no such tree, is built anew
     #[arg(long, value_name = "FOLDER")]

@@ -73,10 +73,10 @@ pub struct ResidentLbvh {
 }
 
 /// What a build leaves on the device.
-struct Ran {
-    buffers: LbvhBuffers,
+pub(in crate::accel) struct Ran {
+    pub(in crate::accel) buffers: LbvhBuffers,
     state: LbvhState,
-    timings: Timings,
+    pub(in crate::accel) timings: Timings,
 }
 
 impl LbvhBuilder {
@@ -455,7 +455,7 @@ impl LbvhBuilder {
 
     /// Builds over triangles that rays can meet, at least two; a tree that was too deep is made again with fewer bits, in passes of the
     /// same names.
-    fn run(&self, corners: &[[Vec3; 3]], indices: &[u32]) -> Result<Ran> {
+    pub(in crate::accel) fn run(&self, corners: &[[Vec3; 3]], indices: &[u32]) -> Result<Ran> {
         let buffers = self.buffers(corners.len() as u32)?;
         self.gpu.upload(&buffers.corners, 0, corners)?;
         self.gpu.upload(&buffers.indices, 0, indices)?;
@@ -557,7 +557,8 @@ impl LbvhBuilder {
         let Some(buffers) = &build.buffers else {
             return Ok((super::refit(&build.index, triangles)?, Timings::default()));
         };
-        check_moved(&build.index, triangles)?;
+        let before = build.index.statistics();
+        check_moved(&before, build.index.triangles(), triangles)?;
         let mut indices: Vec<u32> = build.index.triangles().iter().map(|t| t.index).collect();
         indices.sort_unstable();
         let corners = moved_corners(&indices, triangles);
@@ -565,15 +566,8 @@ impl LbvhBuilder {
         let mut recorder = self.gpu.recorder("lbvh refit")?;
         self.record_refit(&mut recorder, buffers)?;
         let timings = recorder.submit()?.wait()?;
-        let before = build.index.statistics();
-        let statistics = IndexStatistics {
-            triangles: before.triangles,
-            excluded_range: before.excluded_range,
-            excluded_degenerate: before.excluded_degenerate,
-            ..IndexStatistics::default()
-        };
         let nodes = build.index.nodes().len() as u32;
-        Ok((self.read(buffers, nodes, statistics)?, timings))
+        Ok((self.read(buffers, nodes, before.of_triangles())?, timings))
     }
 
     /// The finished index, of whose triangles `statistics` has the counts.
@@ -586,7 +580,7 @@ impl LbvhBuilder {
 }
 
 /// Milliseconds of the passes by stage.
-fn stages_of(timings: &Timings) -> BuildStages {
+pub(in crate::accel) fn stages_of(timings: &Timings) -> BuildStages {
     let mut stages = BuildStages::default();
     for pass in &timings.passes {
         let stage = match pass.name.as_str() {

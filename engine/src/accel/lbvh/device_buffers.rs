@@ -12,7 +12,7 @@ use crate::kernels::{RadixSort, Scan};
 /// software drivers fetch for all lanes at once.
 #[derive(Debug)]
 pub struct LbvhBuffers {
-    pub(super) count: u32,
+    pub(in crate::accel) count: u32,
     /// Corners of the triangles, three vectors each, metres; every one can be met by rays.
     pub corners: Buffer,
     /// How hits name each triangle.
@@ -20,7 +20,7 @@ pub struct LbvhBuffers {
     /// The finished index: nodes, then triangles, as [`RayIndex::texels`](crate::accel::RayIndex::texels) has them.
     pub quarters: TexelView,
     pub(super) boxes: TexelView,
-    pub(super) state: Buffer,
+    pub(in crate::accel) state: Buffer,
     pub(super) keys: [TexelView; 2],
     pub(super) order: [TexelView; 2],
     pub(super) sort_scratch: Buffer,

@@ -14,9 +14,11 @@ mod ray_index;
 mod sort;
 
 pub use codes::SortedCodes;
+pub(in crate::accel) use device::stages_of;
 pub use device::{LbvhBuild, LbvhBuilder, ResidentLbvh};
 pub use device_buffers::LbvhBuffers;
 pub use ray_index::{BuildQuality, LbvhSettings, build, hierarchy_of, refit};
+pub(in crate::accel) use ray_index::{check_moved, moved_corners};
 
 use crate::catalogue::{Role, Row, sources};
 

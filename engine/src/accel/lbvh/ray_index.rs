@@ -10,7 +10,7 @@ use crate::accel::input::{UsableTriangles, bounds_of, can_be_met, check_count, c
 use crate::accel::morton::{MORTON_30_AXIS_BITS, MORTON_63_AXIS_BITS};
 use crate::accel::optimise::{MAX_TREELET, Optimisation, optimise};
 use crate::accel::stages::Stopwatch;
-use crate::accel::{Aabb, BuildStages, LeafRule, MAX_COORDINATE, RayIndex};
+use crate::accel::{Aabb, BuildStages, IndexStatistics, LeafRule, MAX_COORDINATE, RayIndex};
 use bytemuck::Zeroable;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -177,9 +177,9 @@ pub fn build(triangles: &[[Vec3; 3]], settings: &LbvhSettings) -> Result<Bvh2> {
 /// # Errors
 /// [`Error::Setting`](crate::Error::Setting) for another number of triangles, or for one that has moved out of range.
 pub fn refit(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
-    check_moved(index, triangles)?;
     let statistics = index.statistics();
     let count = statistics.triangles as usize;
+    check_moved(&statistics, &index.triangles()[..count], triangles)?;
     let indices: Vec<u32> = index.triangles()[..count].iter().map(|t| t.index).collect();
     let positions = moved_corners(&indices, triangles);
     let mut nodes = if count < 2 { Vec::new() } else { index.nodes().to_vec() };
@@ -204,26 +204,23 @@ pub fn refit(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<Bvh2> {
             };
         }
     }
-    let excluded = crate::accel::IndexStatistics {
-        triangles: statistics.triangles,
-        excluded_range: statistics.excluded_range,
-        excluded_degenerate: statistics.excluded_degenerate,
-        ..Default::default()
-    };
+    let excluded = statistics.of_triangles();
     let triangle = |place: usize| Bvh2Triangle::new(positions[place], indices[place]);
     let layout = Layout::of(&nodes, count, triangle).with_depth(statistics.max_depth);
     Ok(layout.finish(index.name(), excluded, BuildStages::default(), Stopwatch::start()))
 }
 
-/// Refuses triangles that an index cannot be refitted to.
-pub(super) fn check_moved(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<()> {
-    let statistics = index.statistics();
+/// Refuses triangles that an index cannot be refitted to, of whose own ones `usable` are those that rays could meet.
+pub(in crate::accel) fn check_moved(
+    statistics: &IndexStatistics,
+    usable: &[Bvh2Triangle],
+    triangles: &[[Vec3; 3]],
+) -> Result<()> {
     let count = statistics.triangles + statistics.excluded_range + statistics.excluded_degenerate;
     if triangles.len() as u64 != count {
         let cause = format!("is not the {count} that the index was built of");
         return Err(crate::Error::setting("triangles", triangles.len(), cause));
     }
-    let usable = &index.triangles()[..statistics.triangles as usize];
     let outside = |i: &u32| {
         triangles[*i as usize]
             .iter()
@@ -243,7 +240,7 @@ pub(super) fn check_moved(index: &Bvh2, triangles: &[[Vec3; 3]]) -> Result<()> {
 }
 
 /// Corners of some triangles; those without an area become points, which no ray meets.
-pub(super) fn moved_corners(indices: &[u32], triangles: &[[Vec3; 3]]) -> Vec<[Vec3; 3]> {
+pub(in crate::accel) fn moved_corners(indices: &[u32], triangles: &[[Vec3; 3]]) -> Vec<[Vec3; 3]> {
     let corners = |i: &u32| {
         let triangle = triangles[*i as usize];
         if can_be_met(&triangle) {

@@ -124,7 +124,7 @@ impl TraceSettings {
             let fits = |fetches| {
                 let least = Self {
                     execution: Execution::Persistent(PersistentThreads { fetches, ..threads }),
-                    ray_quota: MAX_DEPTH + 1,
+                    ray_quota: traversal.least_quota(),
                     ..self
                 };
                 least.iterations(caps, traversal) <= u64::from(SOFTWARE_LOOP_CAP)
@@ -140,7 +140,7 @@ impl TraceSettings {
         let unstopped = Self { ray_quota: 0, ..self }.iterations(caps, traversal);
         let left = u64::from(SOFTWARE_LOOP_CAP).saturating_sub(unstopped);
         let share = left / u64::from(fetches * lanes_in_sum(caps, traversal));
-        self.ray_quota = self.ray_quota.min(share as u32).max(MAX_DEPTH + 1);
+        self.ray_quota = self.ray_quota.min(share as u32).max(traversal.least_quota());
         self
     }
 
@@ -162,6 +162,9 @@ impl TraceSettings {
             DeviceTraversal::Wide => {
                 DeviceTraversal::wide_iterations(self.ray_quota, lanes_in_sum(caps, traversal), false)
             }
+            DeviceTraversal::TwoLevel => {
+                DeviceTraversal::two_level_iterations(self.ray_quota, lanes_in_sum(caps, traversal), false)
+            }
             // Of rays that try all triangles.
             DeviceTraversal::Driver => u64::from(self.ray_quota),
         };
@@ -182,7 +185,7 @@ impl TraceSettings {
     }
 
     pub(super) fn check(&self, caps: &Caps, traversal: DeviceTraversal) -> Result<()> {
-        check_range("trace.ray_quota", self.ray_quota, MAX_DEPTH + 1, u32::MAX)?;
+        check_range("trace.ray_quota", self.ray_quota, traversal.least_quota(), u32::MAX)?;
         if let Execution::Persistent(threads) = self.execution {
             if traversal == DeviceTraversal::Driver {
                 let cause = "is not for the driver's acceleration structure, which has one invocation per ray";
@@ -232,6 +235,6 @@ fn group_size(caps: &Caps) -> u32 {
 fn lanes_in_sum(caps: &Caps, traversal: DeviceTraversal) -> u32 {
     match traversal {
         DeviceTraversal::Bvh2 | DeviceTraversal::Driver => 1,
-        DeviceTraversal::Kd { .. } | DeviceTraversal::Wide => caps.subgroup_size.max(1),
+        DeviceTraversal::Kd { .. } | DeviceTraversal::Wide | DeviceTraversal::TwoLevel => caps.subgroup_size.max(1),
     }
 }

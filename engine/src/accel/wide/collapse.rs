@@ -1,21 +1,21 @@
 //! A binary tree made wide: which of its nodes become nodes of eight slots and which become leaves, by least cost.
 //!
-//! Source: Ylitie, Karras and Laine, HPG 2017, §3.1. Cost: areas of nodes, and areas of leaves times their triangles times the cost of a test,
-//! relative to the root's. `costs[n][i]` is the least cost of a subtree as at most i + 1 slots of the node above; bottom-up first, then the choices
-//! that lead to the least cost are found again from the root on.
+//! Source: Ylitie, Karras and Laine, HPG 2017, §3.1. Cost: half the areas of nodes, and those of leaves times their triangles times the cost of a
+//! test, in the f32 of the kernels. `costs[n][i]` is the least cost of a subtree as at most i + 1 slots of the node above; bottom-up first, then the
+//! choices that lead to the least cost are found again from the root on.
 //!
-//! Guarantee: nodes, triangles and bytes follow from the binary tree alone.
+//! Guarantee: nodes, triangles and bytes follow from the binary tree alone. Twin of the kernels `wide_costs` and `wide_collapse`.
 
-use super::grid::GridAxis;
+use super::frame::set_boxes;
 use super::slots::{Placed, assign};
-use super::{Header, LEAF_SIZE, SLOTS, WideBvh, WideNode};
+use super::{LEAF_SIZE, SLOTS, WideBvh, WideNode};
 use crate::accel::bvh2::{Bvh2, Bvh2Node, Bvh2Triangle, COUNT_BITS, COUNT_MASK};
+use crate::accel::leaf_rule::half_area;
 use crate::accel::stages::Stopwatch;
-use crate::accel::{Aabb, IndexStatistics, NO_HIT, RayIndex};
+use crate::accel::{Aabb, NO_HIT, RayIndex};
 use crate::gpu::shaders::constants;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
-use glam::Vec3;
 
 /// Costs of a subtree by the number of slots that it may take, from one on.
 type Costs = [f32; SLOTS - 1];
@@ -37,8 +37,14 @@ impl Subtree {
 fn children(node: &Bvh2Node) -> [Subtree; 2] {
     [0, 1].map(|side: usize| Subtree {
         word: node.children[side],
-        bounds: node.bounds[side],
+        bounds: node.bounds[side].without_negative_zero(),
     })
+}
+
+/// The box of a binary node.
+fn bounds_of(node: &Bvh2Node) -> Aabb {
+    let [a, b] = node.bounds.map(Aabb::without_negative_zero);
+    a.union(b)
 }
 
 /// The binary tree with the costs of its subtrees.
@@ -47,40 +53,35 @@ pub(super) struct Collapse<'a> {
     /// Triangles below each node, exact up to one above [`LEAF_SIZE`].
     counts: Vec<u32>,
     costs: Vec<Costs>,
-    root_area: f64,
     triangle_cost: f32,
+    /// Slots of a node, at most [`SLOTS`].
+    width: usize,
 }
 
 impl<'a> Collapse<'a> {
     /// Of a tree of two triangles or more.
-    pub(super) fn of(nodes: &'a [Bvh2Node], triangle_cost: f32) -> Self {
-        let [a, b] = nodes[0].bounds;
-        let root_area = a.union(b).half_area();
+    pub(super) fn of(nodes: &'a [Bvh2Node], triangle_cost: f32, width: usize) -> Self {
         let mut collapse = Self {
             nodes,
             counts: vec![0; nodes.len()],
             costs: vec![[0.0; SLOTS - 1]; nodes.len()],
-            root_area: if root_area > 0.0 { root_area } else { 1.0 },
             triangle_cost,
+            width,
         };
         for index in parents_first(nodes).into_iter().rev() {
             let node = &nodes[index];
             let both = children(node);
             let count = both.iter().map(|child| collapse.count(child)).sum::<u32>();
             let costs = both.map(|child| collapse.costs_of(&child));
-            let area = collapse.area(&node.bounds[0].union(node.bounds[1]));
+            let area = half_area(&bounds_of(node));
             let own = &mut collapse.costs[index];
-            own[0] = (area + distribute(&costs, SLOTS).0).min(leaf_cost(area, count, triangle_cost));
-            for slots in 2..SLOTS {
+            own[0] = (area + distribute(&costs, width).0).min(leaf_cost(area, count, triangle_cost));
+            for slots in 2..width {
                 own[slots - 1] = own[slots - 2].min(distribute(&costs, slots).0);
             }
             collapse.counts[index] = count.min(LEAF_SIZE + 1);
         }
         collapse
-    }
-
-    fn area(&self, bounds: &Aabb) -> f32 {
-        (bounds.half_area() / self.root_area) as f32
     }
 
     fn count(&self, subtree: &Subtree) -> u32 {
@@ -93,22 +94,21 @@ impl<'a> Collapse<'a> {
     fn costs_of(&self, subtree: &Subtree) -> Costs {
         match subtree.node() {
             Some(node) => self.costs[node],
-            None => [leaf_cost(self.area(&subtree.bounds), self.count(subtree), self.triangle_cost); SLOTS - 1],
+            None => [leaf_cost(half_area(&subtree.bounds), self.count(subtree), self.triangle_cost); SLOTS - 1],
         }
     }
 
     /// Least cost of the whole tree under a root that is a node.
     #[cfg(test)]
     pub(super) fn root_cost(&self) -> f32 {
-        let [a, b] = self.nodes[0].bounds;
         let costs = children(&self.nodes[0]).map(|child| self.costs_of(&child));
-        self.area(&a.union(b)) + distribute(&costs, SLOTS).0
+        half_area(&bounds_of(&self.nodes[0])) + distribute(&costs, self.width).0
     }
 
     /// What the slots of a node hold, as they come from left to right.
     fn slots_of(&self, node: usize, found: &mut Vec<Subtree>) {
         found.clear();
-        self.split(node, SLOTS, found);
+        self.split(node, self.width, found);
     }
 
     /// A node's children in so many slots.
@@ -139,7 +139,7 @@ impl<'a> Collapse<'a> {
         let Some(node) = subtree.node() else {
             return true;
         };
-        let area = self.area(&subtree.bounds);
+        let area = half_area(&subtree.bounds);
         leaf_cost(area, self.counts[node], self.triangle_cost) <= self.costs[node][0]
     }
 
@@ -208,14 +208,16 @@ impl Writer<'_> {
     fn fill(&mut self, place: usize, bounds: &Aabb, slots: &[Slot]) -> Vec<(usize, usize)> {
         let placed: Vec<Placed> = slots.iter().map(|slot| (slot.bounds, slot.node.is_some())).collect();
         let assigned = assign(0.5 * bounds.lower + 0.5 * bounds.upper, &placed);
-        let grid = [0, 1, 2].map(|axis: usize| GridAxis::over(bounds.lower[axis], bounds.upper[axis]));
+        let boxes = slots
+            .iter()
+            .zip(assigned)
+            .map(|(slot, at)| (usize::from(at), slot.bounds));
         let mut node = WideNode {
-            corner: Vec3::from_array(grid.map(|axis| axis.corner)),
-            exponents: u32::from_le_bytes([grid[0].exponent, grid[1].exponent, grid[2].exponent, 0]),
             children: self.nodes.len() as u32,
             triangles: self.triangles.len() as u32,
             ..self.nodes[place]
         };
+        set_boxes(&mut node, bounds, boxes);
         let mut below = Vec::new();
         for at in 0..SLOTS {
             let Some(slot) = (0..slots.len())
@@ -224,11 +226,6 @@ impl Writer<'_> {
             else {
                 continue;
             };
-            for (axis, grid) in grid.iter().enumerate() {
-                let [lower, upper] = grid.planes(slot.bounds.lower[axis], slot.bounds.upper[axis]);
-                node.planes[axis][0][at] = lower;
-                node.planes[axis][1][at] = upper;
-            }
             if let Some(child) = slot.node {
                 node.slots |= 1 << (constants::WIDE_INNER_SHIFT as usize + at);
                 below.push((child, self.nodes.len()));
@@ -247,19 +244,21 @@ impl Writer<'_> {
     }
 }
 
-pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
-    let largest = binary
-        .nodes()
-        .iter()
-        .flat_map(|node| node.children)
-        .map(|word| word & COUNT_MASK);
-    if let Some(size) = largest.max().filter(|size| *size > LEAF_SIZE) {
-        return Err(Error::setting(
-            "leaf size",
-            size,
-            format!("is above {LEAF_SIZE}, the most of a wide tree"),
-        ));
+/// Refuses a tree whose leaves are larger than slots.
+pub(super) fn check_leaves(binary: &Bvh2) -> Result<()> {
+    let words = binary.nodes().iter().flat_map(|node| node.children);
+    match words.map(|word| word & COUNT_MASK).max() {
+        Some(size) if size > LEAF_SIZE => {
+            let cause = format!("is above {LEAF_SIZE}, the most of a wide tree");
+            Err(Error::setting("leaf size", size, cause))
+        }
+        _ => Ok(()),
     }
+}
+
+/// The tree of nodes that have `width` slots at most.
+pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32, width: usize) -> Result<WideBvh> {
+    check_leaves(binary)?;
     let mut watch = Stopwatch::start();
     let mut statistics = binary.statistics();
     let mut stages = binary.stages();
@@ -268,10 +267,10 @@ pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
         nodes: vec![WideNode::zeroed()],
         triangles: Vec::with_capacity(binary.triangles().len()),
     };
-    let [a, b] = binary.nodes()[0].bounds;
+    let [a, b] = binary.nodes()[0].bounds.map(Aabb::without_negative_zero);
     let mut bounds = a.union(b);
     if statistics.triangles >= 2 {
-        let tree = Collapse::of(binary.nodes(), triangle_cost);
+        let tree = Collapse::of(binary.nodes(), triangle_cost, width);
         statistics.max_depth = write(&tree, &mut writer);
     } else {
         // The binary tree has a sentinel beside one triangle or none.
@@ -295,25 +294,7 @@ pub(super) fn collapse(binary: &Bvh2, triangle_cost: f32) -> Result<WideBvh> {
     }
     stages.layout += watch.lap();
     let Writer { nodes, triangles, .. } = writer;
-    measure(&nodes, &bounds, &mut statistics);
-    let header = Header {
-        lower: bounds.lower,
-        triangles: constants::WIDE_HEADER_TEXELS + constants::WIDE_NODE_TEXELS * nodes.len() as u32,
-        upper: bounds.upper,
-        zero: 0,
-    };
-    let mut texels: Vec<[u32; 4]> = Vec::with_capacity(header.triangles as usize + 3 * triangles.len());
-    texels.extend(bytemuck::cast::<Header, [[u32; 4]; 2]>(header));
-    texels.extend_from_slice(bytemuck::cast_slice(&nodes));
-    texels.extend_from_slice(bytemuck::cast_slice(&triangles));
-    statistics.bytes = size_of_val(texels.as_slice()) as u64;
-    stages.statistics += watch.lap();
-    Ok(WideBvh {
-        nodes: nodes.len(),
-        texels,
-        statistics,
-        stages,
-    })
+    Ok(WideBvh::assembled(&nodes, &triangles, &bounds, statistics, stages))
 }
 
 /// Nodes depth first, children of one node side by side. The depth.
@@ -325,8 +306,7 @@ fn write(tree: &Collapse<'_>, writer: &mut Writer<'_>) -> u32 {
         deepest = deepest.max(depth);
         tree.slots_of(node, &mut found);
         let slots: Vec<Slot> = found.iter().map(|subtree| slot_of(tree, subtree)).collect();
-        let [a, b] = tree.nodes[node].bounds;
-        let below = writer.fill(place, &a.union(b), &slots);
+        let below = writer.fill(place, &bounds_of(&tree.nodes[node]), &slots);
         pending.extend(below.into_iter().rev().map(|(node, place)| (node, place, depth + 1)));
     }
     deepest
@@ -351,23 +331,4 @@ fn slot_of(tree: &Collapse<'_>, subtree: &Subtree) -> Slot {
         }
     });
     slot
-}
-
-/// Counts nodes and leaves, and sums the SAH cost of decoded boxes.
-fn measure(nodes: &[WideNode], bounds: &Aabb, statistics: &mut IndexStatistics) {
-    let (mut cost, mut leaves) = (0.0, 0);
-    for node in nodes {
-        for slot in 0..SLOTS {
-            let count = node.leaf(slot).1;
-            let tests = if node.child(slot).is_some() { 1 } else { count };
-            let [lower, upper] = node.bounds(slot);
-            let e = upper - lower;
-            cost += f64::from(tests) * (e.x * e.y + e.y * e.z + e.z * e.x);
-            leaves += u64::from(count > 0);
-        }
-    }
-    let root = bounds.half_area();
-    statistics.nodes = nodes.len() as u64;
-    statistics.leaves = leaves;
-    statistics.sah_cost = if root > 0.0 { 1.0 + cost / root } else { 0.0 };
 }

@@ -9,10 +9,10 @@ use crate::accel::Aabb;
 use glam::Vec3;
 
 /// A child's box, and whether it is a node.
-pub(super) type Placed = (Aabb, bool);
+pub(in crate::accel) type Placed = (Aabb, bool);
 
 /// The slot of each child, at most eight.
-pub(super) fn assign(centre: Vec3, children: &[Placed]) -> [u8; SLOTS] {
+pub(in crate::accel) fn assign(centre: Vec3, children: &[Placed]) -> [u8; SLOTS] {
     let mut slots = [0; SLOTS];
     let mut free = (1u32 << SLOTS) - 1;
     let mut left: u32 = (1 << children.len()) - 1;

@@ -311,12 +311,9 @@ fn no_other_collapse_costs_less() {
                 + least_cost(&binary, node.children[1], &node.bounds[1], SLOTS - left, &costs)
         });
         let least = 1.0 + ways.fold(f64::INFINITY, f64::min);
-        let tree = super::collapse::Collapse::of(binary.nodes(), triangle_cost);
-        assert!(
-            (f64::from(tree.root_cost()) - least).abs() < 1e-5 * least,
-            "{count}: {} {least}",
-            tree.root_cost()
-        );
+        let tree = super::collapse::Collapse::of(binary.nodes(), triangle_cost, SLOTS);
+        let found = f64::from(tree.root_cost()) / root;
+        assert!((found - least).abs() < 1e-5 * least, "{count}: {found} {least}");
         // What was written costs that, too.
         let settings = WideSettings {
             triangle_cost,
@@ -503,4 +500,57 @@ fn invalid_rays_and_settings_are_refused() {
     )
     .expect("valid");
     assert!(WideBvh::collapse(&large, &WideSettings::default()).is_err());
+}
+
+#[test]
+fn refitted_trees_have_the_hits_of_all_triangles() {
+    let mut random = Random(30);
+    for (name, mut triangles) in hard_scenes() {
+        let trees = [build(&triangles), of_binned(&triangles)];
+        for tree in &trees {
+            let same = refit(tree, &triangles).expect("unmoved");
+            assert!(same.texels() == tree.texels(), "{name}");
+            assert_eq!(same.statistics(), tree.statistics(), "{name}");
+        }
+        // Some go far, a plane's triangles and points among them.
+        let largest = triangles
+            .iter()
+            .flatten()
+            .filter(|v| v.is_finite())
+            .fold(1e-3f32, |largest, v| largest.max(v.abs().max_element().min(1e8)));
+        for (i, triangle) in triangles.iter_mut().enumerate() {
+            let shift = largest * random.vector() * if i % 50 == 0 { 2.0 } else { 0.02 };
+            triangle.iter_mut().for_each(|v| *v += shift);
+            if i % 40 == 1 {
+                triangle[1] = triangle[2];
+            }
+        }
+        for tree in &trees {
+            let usable = usable(&triangles, tree);
+            let Ok(moved) = refit(tree, &triangles) else {
+                assert!(
+                    triangles.iter().flatten().any(|v| v.abs().max_element() > 1e9),
+                    "{name}"
+                );
+                continue;
+            };
+            assert_eq!(moved.statistics().max_depth, tree.statistics().max_depth, "{name}");
+            let meets = |i: usize| usable[i] && crate::accel::input::can_be_met(&triangles[i]);
+            let mut hits = 0;
+            for ray in hard_rays(&mut random, &triangles, 600) {
+                let expected = brute_force(&triangles, meets, &ray);
+                let hit = moved.closest_hit(&ray);
+                assert!(same_bits(&hit, &expected), "{name}: {ray:?}\n{hit:?}\n{expected:?}");
+                assert_eq!(moved.any_hit(&ray), expected.is_hit(), "{name}: {ray:?}");
+                hits += u32::from(expected.is_hit());
+            }
+            assert!(hits > 20 || triangles.len() < 3, "{name}: {hits} hits");
+        }
+    }
+    let triangles = grid(6);
+    let tree = build(&triangles);
+    assert!(refit(&tree, &triangles[1..]).is_err());
+    let mut far = triangles;
+    far[3][1].y = f32::INFINITY;
+    assert!(refit(&tree, &far).is_err());
 }

@@ -121,8 +121,10 @@ sources! {
     SUYKENS_WILLEMS_2001 = "suykens-willems-2001": "F. Suykens, Y. Willems", "Path Differentials and Applications", "EGWR", 2001;
     TURK_1994 = "turk-1994": "G. Turk", "The PLY Polygon File Format", "", 1994;
     VEACH_1997 = "veach-1997": "E. Veach", "Robust Monte Carlo Methods for Light Transport Simulation", "PhD thesis, Stanford University", 1997;
+    WALD_2003 = "wald-2003": "I. Wald, C. Benthin, P. Slusallek", "Distributed Interactive Ray Tracing of Dynamic Scenes", "PVG", 2003;
     WALD_2004 = "wald-2004": "I. Wald", "Realtime Ray Tracing and Interactive Global Illumination", "PhD thesis, Saarland University", 2004;
     WALD_2007 = "wald-2007": "I. Wald", "On fast Construction of SAH-based Bounding Volume Hierarchies", "IEEE RT", 2007;
+    WALD_2008 = "wald-2008": "I. Wald, C. Benthin, S. Boulos", "Getting Rid of Packets: Efficient SIMD Single-Ray Traversal using Multi-branching BVHs", "IEEE RT", 2008;
     WALD_GUENTHER_2004 = "wald-guenther-2004": "I. Wald, J. Günther, P. Slusallek", "Balancing Considered Harmful: Faster Photon Mapping using the Voxel Volume Heuristic", "Eurographics", 2004;
     WALD_HAVRAN_2006 = "wald-havran-2006": "I. Wald, V. Havran", "On building fast kd-Trees for Ray Tracing, and on doing that in O(N log N)", "IEEE RT", 2006;
     WALTER_2005 = "walter-2005": "B. Walter et al.", "Lightcuts: A Scalable Approach to Illumination", "SIGGRAPH", 2005;

@@ -67,6 +67,7 @@ impl Pipelines {
             has_normal_maps: false,
             has_absorption: shade.has_absorption,
             has_unlit: shade.has_unlit,
+            has_instances: shade.has_instances,
             has_environment: shade.has_environment,
             has_area_lights: shade.has_area_lights,
             has_punctual_lights: shade.has_punctual_lights,

@@ -147,6 +147,7 @@ impl PhotonTracer {
             has_shading_normals: false,
             has_normal_maps: false,
             has_unlit: false,
+            has_instances: profile.keeps_instances,
             has_alpha: profile.has_alpha(),
             has_environment: profile.has_environment(),
             has_area_lights: scene.has_area_lights(),

@@ -74,6 +74,10 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
         (profile.alpha.blend, "partial alpha is drawn opaque".into()),
         (profile.media.any(), NO_MEDIA.into()),
         (
+            profile.keeps_instances,
+            "it draws triangle by triangle, and the scene keeps its instances; with another ray index, such as `wide`, they are flattened".into(),
+        ),
+        (
             placed > SHADOW_MAPS_MAX as usize,
             format!("{placed} lights have a place, and there are shadow maps for {SHADOW_MAPS_MAX}"),
         ),

@@ -7,7 +7,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::geometry::{Geometry, corners_of, instances_in_order};
+use super::geometry::{Geometry, corners_of, numbered_instances};
 use crate::scene::{Material, Scene};
 
 /// The bodies of a scene.
@@ -25,7 +25,7 @@ struct Body {
 }
 
 /// Whether light goes in and out of what the material bounds.
-fn bounds_body(material: &Material) -> bool {
+pub(super) fn bounds_body(material: &Material) -> bool {
     material.boundary || (material.transmission > 0.0 && material.thickness > 0.0)
 }
 
@@ -34,7 +34,9 @@ impl Bodies {
     pub(super) fn place(scene: &Scene, geometry: &mut Geometry) -> Self {
         let mut bodies = Self::default();
         let mut first_triangle = 0;
-        for instance in instances_in_order(scene) {
+        let kept = |object: usize| geometry.kept.as_ref().is_some_and(|kept| kept.keeps(object));
+        // Those that are kept are none.
+        for (_, instance) in numbered_instances(scene).filter(|(object, _)| !kept(*object)) {
             let mesh = &scene.meshes[instance.mesh as usize];
             let end = first_triangle + mesh.triangles.len();
             let material = mesh

@@ -1,4 +1,4 @@
-//! All instances of a scene flattened to world space: vertices with what the profile says is used of them, and triangles.
+//! The instances of a scene flattened to world space, but for those that are [`kept`](super::kept): vertices with what the profile says is used of them, and triangles.
 //!
 //! Transforms are applied in f64 and rounded once; a mirroring one swaps two corners, so that front faces stay front faces. Triangles
 //! keep the order of instances, those of invisible boundaries behind all others: of hits at one distance the first triangle counts, so a
@@ -6,8 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DMat3, Vec3};
+use glam::{DMat3, Vec3, Vec4};
 
+use super::kept::{Keeping, KeptInstances};
 use crate::accel::MAX_COORDINATE;
 use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
@@ -15,7 +16,7 @@ use crate::raster::ObjectTriangles;
 use crate::scene::{Instance, Mesh, Scene, SceneProfile};
 use crate::{Error, Result};
 
-/// All instances flattened to world space.
+/// All instances flattened to world space, but for those that are kept.
 #[derive(Default)]
 pub(super) struct Geometry {
     /// Attributes of vertices, and where those of each triangle's corners are; empty without any.
@@ -25,6 +26,17 @@ pub(super) struct Geometry {
     pub(super) tangents: Vec<[f32; 4]>,
     pub(super) colors: Vec<[f32; 4]>,
     pub(super) triangles: Vec<SceneTriangle>,
+    /// The instances that are not flattened, where some are not.
+    pub(super) kept: Option<KeptInstances>,
+    placed_vertices: u32,
+}
+
+/// A mesh where it is to be, and what becomes of its normals and tangents there.
+struct WorldMesh<'a> {
+    positions: Vec<Vec3>,
+    normal: &'a dyn Fn(Vec3) -> Vec3,
+    tangent: &'a dyn Fn(Vec4) -> Vec4,
+    flipped: bool,
 }
 
 /// Instances in the order of their triangles.
@@ -33,14 +45,14 @@ pub(super) fn instances_in_order(scene: &Scene) -> impl Iterator<Item = &Instanc
 }
 
 /// The same with their numbers in the scene.
-fn numbered_instances(scene: &Scene) -> impl Iterator<Item = (usize, &Instance)> {
+pub(super) fn numbered_instances(scene: &Scene) -> impl Iterator<Item = (usize, &Instance)> {
     let all = || scene.instances.iter().enumerate();
     all()
         .filter(|(_, instance)| !bounds_medium(scene, instance))
         .chain(all().filter(|(_, instance)| bounds_medium(scene, instance)))
 }
 
-fn bounds_medium(scene: &Scene, instance: &Instance) -> bool {
+pub(super) fn bounds_medium(scene: &Scene, instance: &Instance) -> bool {
     let material = scene.meshes[instance.mesh as usize].material;
     material.is_some_and(|index| scene.materials[index as usize].boundary)
 }
@@ -62,15 +74,14 @@ pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
 }
 
 /// Fails for more triangles or vertices than fit in texel buffers of `limit` texels, before any is placed: a small file may place one mesh a million
-/// times.
-pub(super) fn check_placed(scene: &Scene, profile: &SceneProfile, limit: u64) -> Result<()> {
+/// times. Of the instances that `keeping` keeps each mesh counts once.
+pub(super) fn check_placed(scene: &Scene, profile: &SceneProfile, keeping: Option<&Keeping>, limit: u64) -> Result<()> {
     const TRIANGLE_TEXELS: u64 = (size_of::<SceneTriangle>() / size_of::<[u32; 4]>()) as u64;
     let placed = |of: fn(&Mesh) -> usize| {
-        let counts = scene
-            .instances
-            .iter()
-            .map(|at| of(&scene.meshes[at.mesh as usize]) as u64);
-        counts.sum::<u64>()
+        let flattened = (0..scene.instances.len()).filter(|i| keeping.is_none_or(|keeping| !keeping.instances[*i]));
+        let placed = flattened.map(|i| of(&scene.meshes[scene.instances[i].mesh as usize]) as u64);
+        let kept = keeping.into_iter().flat_map(|keeping| &keeping.meshes);
+        placed.sum::<u64>() + kept.map(|mesh| of(&scene.meshes[*mesh as usize]) as u64).sum::<u64>()
     };
     let vertices = if has_attributes(profile) {
         placed(|mesh| mesh.positions.len())
@@ -94,81 +105,115 @@ pub(super) fn check_placed(scene: &Scene, profile: &SceneProfile, limit: u64) ->
 }
 
 /// Whether shading reads more of vertices than where they are.
-fn has_attributes(profile: &SceneProfile) -> bool {
+pub(super) fn has_attributes(profile: &SceneProfile) -> bool {
     profile.has_shading_normals || profile.has_textures || profile.has_normal_maps || profile.has_vertex_colors
 }
 
 impl Geometry {
     pub(super) fn flatten(scene: &Scene, profile: &SceneProfile) -> Result<Self> {
         let mut all = Self::default();
-        let default_material = scene.materials.len() as u32;
-        let has_attributes = has_attributes(profile);
-        let mut placed = 0u32;
         for instance in instances_in_order(scene) {
-            let mesh = &scene.meshes[instance.mesh as usize];
-            let base = placed;
-            placed = u32::try_from(mesh.positions.len())
-                .ok()
-                .and_then(|count| base.checked_add(count))
-                .ok_or_else(|| Error::scene(&scene.source, "instances", "place more than 2^32 vertices"))?;
-            let end = placed as usize;
-            let linear = instance.transform.matrix3;
-            // Cofactors transform normals without dividing by a determinant that may be zero.
-            let cofactors = DMat3::from_cols(
-                linear.y_axis.cross(linear.z_axis),
-                linear.z_axis.cross(linear.x_axis),
-                linear.x_axis.cross(linear.y_axis),
-            );
-            let flipped = linear.determinant() < 0.0;
-            let orientation = if flipped { -1.0 } else { 1.0 };
-            let positions: Vec<_> = mesh
+            all.place(scene, instance, profile)?;
+        }
+        Ok(all)
+    }
+
+    /// Adds the triangles of an instance, in world space.
+    pub(super) fn place(&mut self, scene: &Scene, instance: &Instance, profile: &SceneProfile) -> Result<()> {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let linear = instance.transform.matrix3;
+        // Cofactors transform normals without dividing by a determinant that may be zero.
+        let cofactors = DMat3::from_cols(
+            linear.y_axis.cross(linear.z_axis),
+            linear.z_axis.cross(linear.x_axis),
+            linear.x_axis.cross(linear.y_axis),
+        );
+        let flipped = linear.determinant() < 0.0;
+        let orientation = if flipped { -1.0 } else { 1.0 };
+        let world = WorldMesh {
+            positions: mesh
                 .positions
                 .iter()
                 .map(|p| instance.transform.transform_point3(p.as_dvec3()).as_vec3())
-                .collect();
-            if profile.has_shading_normals {
-                let normal = |n: &Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3();
-                all.normals
-                    .extend(mesh.normals.iter().map(|n| normal(n).extend(0.0).to_array()));
-                // Zero stands for "flat" in the shader.
-                all.normals.resize(end, [0.0; 4]);
-            }
-            if profile.has_textures {
-                let uv = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
-                all.uvs.extend((0..positions.len()).map(|i| {
-                    let (a, b) = (uv(&mesh.uv0, i), uv(&mesh.uv1, i));
-                    [a.x, a.y, b.x, b.y]
-                }));
-            }
-            if profile.has_normal_maps {
-                let tangent = |t: &glam::Vec4| {
-                    let world = (linear * t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
-                    world.extend(t.w * orientation as f32).to_array()
-                };
-                all.tangents.extend(mesh.tangents.iter().map(tangent));
-                all.tangents.resize(end, [0.0; 4]);
-            }
-            if profile.has_vertex_colors {
-                all.colors.extend(mesh.colors.iter().map(|c| c.to_array()));
-                all.colors.resize(end, [1.0; 4]);
-            }
-            let material = mesh.material.unwrap_or(default_material);
-            for &[a, b, c] in &mesh.triangles {
-                let (b, c) = if flipped { (c, b) } else { (b, c) };
-                all.triangles.push(SceneTriangle {
-                    a: positions[a as usize].to_array(),
-                    material,
-                    b: positions[b as usize].to_array(),
-                    light: NO_LIGHT,
-                    c: positions[c as usize].to_array(),
-                    around: 0,
-                });
-                if has_attributes {
-                    all.vertices.push([base + a, base + b, base + c, 0]);
-                }
+                .collect(),
+            normal: &|n: Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3(),
+            tangent: &|t: Vec4| {
+                let world = (linear * t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+                world.extend(t.w * orientation as f32)
+            },
+            flipped,
+        };
+        self.add(scene, mesh, world, profile)
+    }
+
+    /// Adds the triangles of a mesh as they are, in its own space.
+    pub(super) fn store(&mut self, scene: &Scene, mesh: &Mesh, profile: &SceneProfile) -> Result<()> {
+        let own = WorldMesh {
+            positions: mesh.positions.clone(),
+            normal: &|n| n,
+            tangent: &|t| t,
+            flipped: false,
+        };
+        self.add(scene, mesh, own, profile)
+    }
+
+    fn add(&mut self, scene: &Scene, mesh: &Mesh, world: WorldMesh<'_>, profile: &SceneProfile) -> Result<()> {
+        let base = self.placed_vertices;
+        self.placed_vertices = u32::try_from(mesh.positions.len())
+            .ok()
+            .and_then(|count| base.checked_add(count))
+            .ok_or_else(|| Error::scene(&scene.source, "instances", "place more than 2^32 vertices"))?;
+        let end = self.placed_vertices as usize;
+        if profile.has_shading_normals {
+            let normals = mesh.normals.iter().map(|n| (world.normal)(*n).extend(0.0).to_array());
+            self.normals.extend(normals);
+            // Zero stands for "flat" in the shader.
+            self.normals.resize(end, [0.0; 4]);
+        }
+        if profile.has_textures {
+            let uv = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
+            self.uvs.extend((0..mesh.positions.len()).map(|i| {
+                let (a, b) = (uv(&mesh.uv0, i), uv(&mesh.uv1, i));
+                [a.x, a.y, b.x, b.y]
+            }));
+        }
+        if profile.has_normal_maps {
+            self.tangents
+                .extend(mesh.tangents.iter().map(|t| (world.tangent)(*t).to_array()));
+            self.tangents.resize(end, [0.0; 4]);
+        }
+        if profile.has_vertex_colors {
+            self.colors.extend(mesh.colors.iter().map(|c| c.to_array()));
+            self.colors.resize(end, [1.0; 4]);
+        }
+        let material = mesh.material.unwrap_or(scene.materials.len() as u32);
+        let has_attributes = has_attributes(profile);
+        let positions = &world.positions;
+        for &[a, b, c] in &mesh.triangles {
+            let (b, c) = if world.flipped { (c, b) } else { (b, c) };
+            self.triangles.push(SceneTriangle {
+                a: positions[a as usize].to_array(),
+                material,
+                b: positions[b as usize].to_array(),
+                light: NO_LIGHT,
+                c: positions[c as usize].to_array(),
+                around: 0,
+            });
+            if has_attributes {
+                self.vertices.push([base + a, base + b, base + c, 0]);
             }
         }
-        Ok(all)
+        Ok(())
+    }
+
+    /// How many of the triangles are in world space: the first ones.
+    pub(super) fn in_world(&self) -> usize {
+        self.kept.as_ref().map_or(self.triangles.len(), |kept| kept.names.len())
+    }
+
+    /// What hits call a triangle in world space.
+    pub(super) fn name(&self, triangle: usize) -> u32 {
+        self.kept.as_ref().map_or(triangle as u32, |kept| kept.names[triangle])
     }
 
     /// The corners' bits, whatever their order: equal for triangles that cover the same points.
@@ -179,14 +224,15 @@ impl Geometry {
         place
     }
 
-    /// The first triangle in each place where some triangle `emits`.
+    /// The first triangle in each place where some triangle `emits`, of those in world space.
     pub(super) fn first_copies(&self, emits: impl Fn(&SceneTriangle) -> bool) -> BTreeMap<[[u32; 3]; 3], usize> {
-        let emitters = self.triangles.iter().filter(|triangle| emits(triangle));
+        let triangles = &self.triangles[..self.in_world()];
+        let emitters = triangles.iter().filter(|triangle| emits(triangle));
         let mut first: BTreeMap<_, _> = emitters
-            .map(|triangle| (Self::coincidence_key(triangle), self.triangles.len()))
+            .map(|triangle| (Self::coincidence_key(triangle), triangles.len()))
             .collect();
         if !first.is_empty() {
-            for (index, triangle) in self.triangles.iter().enumerate() {
+            for (index, triangle) in triangles.iter().enumerate() {
                 if let Some(known) = first.get_mut(&Self::coincidence_key(triangle)) {
                     *known = index.min(*known);
                 }
@@ -195,24 +241,35 @@ impl Geometry {
         first
     }
 
+    /// Corners of the triangles in world space.
     pub(super) fn corners(&self) -> Vec<[Vec3; 3]> {
-        self.triangles.iter().map(corners_of).collect()
+        self.triangles[..self.in_world()].iter().map(corners_of).collect()
     }
 
-    /// Area of all triangles, m².
+    /// Area of all triangles, m²; of those of kept instances as [`KeptInstances::surface_area`] has it.
     pub(super) fn surface_area(&self) -> f64 {
         let area = |triangle: &SceneTriangle| {
             let [a, b, c] = corners_of(triangle).map(|corner| corner.as_dvec3());
             0.5 * (b - a).cross(c - a).length()
         };
-        self.triangles.iter().map(area).filter(|area| area.is_finite()).sum()
+        let in_world = self.triangles[..self.in_world()].iter();
+        let flattened: f64 = in_world.map(area).filter(|area| area.is_finite()).sum();
+        flattened
+            + self
+                .kept
+                .as_ref()
+                .map_or(0.0, |kept| kept.surface_area(&self.triangles))
     }
 
     pub(super) fn bounds(&self) -> [Vec3; 2] {
-        let corners = self.triangles.iter().flat_map(corners_of).filter(is_traceable);
-        let (lower, upper) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
+        let in_world = self.triangles[..self.in_world()].iter();
+        let corners = in_world.flat_map(corners_of).filter(is_traceable);
+        let (mut lower, mut upper) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), p| {
             (lower.min(p), upper.max(p))
         });
+        if let Some(kept) = &self.kept {
+            (lower, upper) = kept.with_images(lower, upper, &self.triangles);
+        }
         if lower.x <= upper.x {
             [lower, upper]
         } else {
@@ -253,7 +310,7 @@ mod tests {
                 name: String::new(),
             };
             scene.instances = vec![at; 5];
-            match check_placed(&scene, &SceneProfile::of(&scene), limit) {
+            match check_placed(&scene, &SceneProfile::of(&scene), None, limit) {
                 Err(Error::LimitExceeded { name, value, .. }) => Some((name, value)),
                 _ => None,
             }

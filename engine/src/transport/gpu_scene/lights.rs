@@ -55,7 +55,7 @@ impl Lights {
         };
         let first_copies = geometry.first_copies(emits);
         let mut has_unsampled = false;
-        for index in 0..geometry.triangles.len() {
+        for index in 0..geometry.in_world() {
             let triangle = geometry.triangles[index];
             if !emits(&triangle) {
                 continue;
@@ -93,7 +93,7 @@ impl Lights {
                 bounds.push(Some(triangle_bounds([a, b, c], luminance(emission), double_sided)));
                 records.push(SceneLight {
                     kind: LIGHT_TRIANGLE,
-                    triangle: index as u32,
+                    triangle: geometry.name(index),
                     ..SceneLight::default()
                 });
             }

@@ -6,6 +6,8 @@
 mod airlight;
 mod bodies;
 mod geometry;
+mod index;
+mod kept;
 mod light_tree;
 mod lights;
 mod materials;
@@ -15,11 +17,14 @@ mod punctual;
 mod textures;
 
 use std::path::Path;
+use std::sync::Mutex;
 
 use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
 use self::geometry::{Geometry, check_placed, visible_objects};
+use self::index::{index_for, index_over_instances};
+use self::kept::{Keeping, KeptInstances};
 use self::light_tree::TreeOfLights;
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
@@ -29,8 +34,8 @@ use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
-use crate::accel::bvh2::Bvh2Settings;
-use crate::accel::{DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
+use crate::accel::two_level::{TwoLevelBvh, TwoLevelWork};
+use crate::accel::{Aabb, DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{self, SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::sets::{MediaSet, SceneSet};
@@ -56,8 +61,19 @@ pub struct GpuScene {
     punctual_lights: PunctualLights,
     light_tree: TreeOfLights,
     index: IndexOnDevice,
+    /// Box of what rays may meet in the index, where instances are kept.
+    index_bounds: Aabb,
+    /// Where instances are kept: what moves them.
+    kept: Option<Mutex<Kept>>,
     buffers: SceneBuffers,
     media: Option<GpuMedia>,
+}
+
+/// Kept instances and their index, as the device has them.
+#[derive(Debug)]
+struct Kept {
+    instances: KeptInstances,
+    index: TwoLevelBvh,
 }
 
 /// Which kinds of lights there are to choose: emitters without area and lights without power are none.
@@ -83,6 +99,7 @@ struct SceneBuffers {
     cdf: TexelView,
     environment: TexelView,
     albedo_table: TexelView,
+    instances: TexelView,
 }
 
 /// How kernels trace rays that stop for good at a quota.
@@ -106,39 +123,8 @@ pub(crate) fn ray_iterations(profile: &SceneProfile) -> u32 {
     }
 }
 
-/// The index that was asked for, or the default one where rays in that could not be stopped in time.
-fn index_for(
-    gpu: &Gpu,
-    geometry: &Geometry,
-    profile: &SceneProfile,
-    kind: &IndexKind,
-    folder: Option<&Path>,
-) -> Result<IndexOnDevice> {
-    let corners = geometry.corners();
-    let asked = kind.build_or_read_for(gpu, &corners, folder)?;
-    // Techniques may trace two rays in a dispatch.
-    let iterations = ray_iterations(profile).min(SOFTWARE_LOOP_CAP / 2);
-    match asked
-        .traversal
-        .quota_within(gpu.caps(), 1, iterations, profile.has_alpha())
-    {
-        Ok(_) => Ok(asked),
-        Err(Error::LimitExceeded { .. }) => {
-            let because = match asked.traversal {
-                DeviceTraversal::Wide => "a round of its rays is longer than the loops of a software device",
-                _ => "a leaf of the kd-tree is longer than the loops of a software device",
-            };
-            drop(asked);
-            let mut index = IndexKind::Bvh2(Bvh2Settings::default()).build_for(gpu, &corners)?;
-            index.report.instead_because = Some(because);
-            Ok(index)
-        }
-        Err(error) => Err(error),
-    }
-}
-
 impl GpuScene {
-    /// Checks the scene, builds its index by the binned surface area heuristic on the host's threads and uploads everything.
+    /// Checks the scene, builds its index on the host's threads, of the kind that is the default, and uploads everything.
     ///
     /// # Errors
     /// [`Error::Scene`] for a scene that does not pass [`Scene::check`],
@@ -147,8 +133,14 @@ impl GpuScene {
         Self::with_index(gpu, scene, &IndexKind::default())
     }
 
-    /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it. A kd-tree with a leaf that is too long for a software device's loops,
+    /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it, but for two levels. A kd-tree with a leaf that is too long for a software device's loops,
     /// as where thousands of triangles lie in one place, is replaced by the binned hierarchy, and the report says so ([`IndexReport::instead_because`]).
+    ///
+    /// With [`IndexKind::TwoLevel`] instances are kept: meshes that are placed more than once are stored once, but for those that emit light, those that are
+    /// bodies in scenes with media, and instances by transforms too uneven for rays ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)). Their vertices are in
+    /// other places by rounding in f32, so pictures differ by as much. [`IndexKind::Automatic`] keeps instances where flattening them would need at least eight times as
+    /// many bytes of geometry and index as that, and 64 MiB or more, or more texels than the device can bind; elsewhere it is the wide hierarchy.
+    /// What is rasterized needs flattened scenes.
     ///
     /// # Errors
     /// As [`GpuScene::new`], [`Error::Setting`] for settings of the index that are out of range, and [`Error::MissingFeature`] for one that the device
@@ -163,12 +155,31 @@ impl GpuScene {
     /// As [`GpuScene::with_index`]; what cannot be read or written there is none.
     pub fn with_kept_index(gpu: &Gpu, scene: &Scene, kind: &IndexKind, folder: Option<&Path>) -> Result<Self> {
         scene.check()?;
-        let profile = SceneProfile::of(scene);
-        check_placed(scene, &profile, gpu.caps().max_texel_buffer_elements)?;
-        let mut geometry = Geometry::flatten(scene, &profile)?;
+        let mut profile = SceneProfile::of(scene);
+        let limit = gpu.caps().max_texel_buffer_elements;
+        let keeping = match kind {
+            IndexKind::TwoLevel(settings) => Keeping::of(scene, &profile).map(|keeping| (keeping, settings)),
+            IndexKind::Automatic(settings) => Keeping::of(scene, &profile)
+                .filter(|keeping| keeping.pays(scene, &profile, limit))
+                .map(|keeping| (keeping, settings)),
+            _ => None,
+        };
+        check_placed(scene, &profile, keeping.as_ref().map(|(keeping, _)| keeping), limit)?;
+        let mut geometry = match &keeping {
+            Some((keeping, _)) => Geometry::keep(scene, &profile, keeping)?,
+            None => Geometry::flatten(scene, &profile)?,
+        };
+        profile.keeps_instances = geometry.kept.is_some();
         let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
-        let index = index_for(gpu, &geometry, &profile, kind, folder)?;
+        let kept = match &keeping {
+            Some((_, settings)) => index_over_instances(gpu, &mut geometry, &profile, settings)?,
+            None => None,
+        };
+        let (index, kept) = match kept {
+            Some((index, kept)) => (index, Some(Mutex::new(kept))),
+            None => (index_for(gpu, &geometry, &profile, kind, folder)?, None),
+        };
         let default = Material::default();
         let materials = materials_by_use(scene, &default);
         let placed = materials
@@ -189,9 +200,13 @@ impl GpuScene {
         let buffers = SceneBuffers::upload(gpu, &geometry, &records, &textures, &lights, albedo)?;
         let media = bodies.map(|bodies| GpuMedia::new(gpu, scene, bodies)).transpose()?;
         Ok(Self {
-            profile,
             bsdf,
-            objects: visible_objects(scene),
+            // What is rasterized is drawn triangle by triangle.
+            objects: match profile.keeps_instances {
+                true => Vec::new(),
+                false => visible_objects(scene),
+            },
+            profile,
             bounds,
             surface_area: geometry.surface_area(),
             light_power: lights.power,
@@ -201,6 +216,8 @@ impl GpuScene {
             punctual_lights: lights.punctual,
             light_tree: lights.tree,
             index,
+            index_bounds: kept.as_ref().map_or(Aabb::EMPTY, |kept| lock(kept).index.bounds()),
+            kept,
             buffers,
             media,
         })
@@ -209,6 +226,11 @@ impl GpuScene {
     /// What the scene needs.
     pub fn profile(&self) -> &SceneProfile {
         &self.profile
+    }
+
+    /// What the index of two levels has built so far, where instances are kept.
+    pub fn index_work(&self) -> Option<TwoLevelWork> {
+        self.kept.as_ref().map(|kept| lock(kept).index.work())
     }
 
     /// What its materials need of the scattering function.
@@ -260,7 +282,8 @@ impl GpuScene {
                 DeviceTraversal::Bvh2 | DeviceTraversal::Driver => texels.min(quota.into()),
                 // A round's further iterations beside a node's five texels and a triangle's three.
                 DeviceTraversal::Wide => (2 * texels).min(quota.into()),
-                DeviceTraversal::Kd { .. } => quota.into(),
+                // A mesh is met once an instance.
+                DeviceTraversal::Kd { .. } | DeviceTraversal::TwoLevel => quota.into(),
             },
         })
     }
@@ -270,7 +293,7 @@ impl GpuScene {
         self.bounds
     }
 
-    /// What is rasterized of it: all triangles but those of invisible boundaries.
+    /// What is rasterized of it: all triangles but those of invisible boundaries; none where instances are kept ([`SceneProfile::keeps_instances`]).
     pub fn surfaces(&self) -> Surfaces<'_> {
         Surfaces {
             set: self.scene_set(),
@@ -411,6 +434,7 @@ impl GpuScene {
             scene_albedo_table: &b.albedo_table,
             // Of the same format; kernels without a tree do not read it.
             scene_light_tree: &b.materials,
+            scene_instances: &b.instances,
         }
     }
 
@@ -422,6 +446,11 @@ impl GpuScene {
             ..set
         }
     }
+}
+
+/// What is behind a lock, also where a thread has panicked that held it: what it holds is changed as a whole.
+fn lock(kept: &Mutex<Kept>) -> std::sync::MutexGuard<'_, Kept> {
+    kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 impl GpuScene {
@@ -496,6 +525,10 @@ impl SceneBuffers {
             cdf: floats("light probabilities", c, &lights.cdf)?,
             environment: quarters("environment", c, &lights.environment)?,
             albedo_table: floats("albedo table", b, albedo)?,
+            instances: match &geometry.kept {
+                Some(kept) => quarters("instances", a, bytemuck::cast_slice(&kept.records))?,
+                None => no_words,
+            },
         })
     }
 }

@@ -5,8 +5,6 @@ use clerestory::accel::{NO_HIT, Ray, RayIndex};
 use clerestory::{Result, scene};
 use glam::{DVec3, Vec3};
 
-use crate::geometry;
-
 /// A function over the sphere.
 pub struct Environment {
     /// Its name.
@@ -48,7 +46,8 @@ fn edges(d: DVec3) -> f64 {
 /// Colours of surfaces seen from within a city of boxes, under the sky.
 fn live() -> Result<Box<dyn Fn(DVec3) -> f64 + Sync>> {
     let scene = scene::load(SCENE)?;
-    let (triangles, albedos): (Vec<_>, Vec<_>) = geometry::triangles_with_materials(&scene)
+    let (triangles, albedos): (Vec<_>, Vec<_>) = scene
+        .triangles()
         .map(|(triangle, material)| {
             let material = material.and_then(|index| scene.materials.get(index as usize));
             let color = material.map_or(Vec3::splat(0.5), |material| material.base_color.truncate());

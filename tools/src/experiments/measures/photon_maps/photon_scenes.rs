@@ -12,7 +12,7 @@ use clerestory::{Result, scene};
 use glam::Vec3;
 
 use crate::experiments::reference::short_name;
-use crate::geometry::{self, area, triangles_with_materials};
+use crate::geometry::{self, area};
 use crate::random::Random;
 
 /// Rays begin that far from surfaces, relative to the scene's extent.
@@ -116,7 +116,8 @@ impl Surfaces {
             let material = material.and_then(|i| scene.materials.get(i as usize));
             material.is_some_and(|m| m.metallic > 0.0 && m.roughness == 0.0)
         };
-        let (triangles, mirrors): (Vec<_>, Vec<_>) = triangles_with_materials(&scene)
+        let (triangles, mirrors): (Vec<_>, Vec<_>) = scene
+            .triangles()
             .map(|(triangle, material)| (triangle, is_mirror(material)))
             .unzip();
         let corners = triangles.iter().flatten();
