@@ -3,7 +3,7 @@
 //! Readers and generators end with it, and a host that builds a [`Scene`] itself should too: what passes cannot make an upload or a
 //! traversal read outside its buffers.
 
-use super::{Camera, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
+use super::{Camera, FresnelForm, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
 use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place.
@@ -226,6 +226,8 @@ fn check_material(material: &Material, images: usize) -> Result<(), Fault> {
         if conductor.eta.min_element() <= 0.0 {
             return Err(("conductor.eta".into(), "must be above 0".into()));
         }
+    } else if material.fresnel != FresnelForm::Exact {
+        return Err(("fresnel".into(), format!("{} needs a conductor", material.fresnel)));
     }
     if material.phong {
         let others = [

@@ -22,6 +22,7 @@ pub mod texture;
 pub use files::{LoadOptions, Loaded, load, load_with};
 pub(crate) use medium::mean_density;
 pub use medium::{DensityGrid, MajorantGrid, Medium, Phase};
+pub use metals::FresnelForm;
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, MediaUse, PhaseUse, SceneProfile, TransmissionUse};
 
 use glam::{DAffine3, Vec2, Vec3, Vec4};
@@ -242,6 +243,8 @@ pub struct Material {
     pub boundary: bool,
     /// Exact conductor that replaces the metallic lobe's Schlick Fresnel (sidecar only).
     pub conductor: Option<ConductorIor>,
+    /// How the conductor's reflectance follows from its index (sidecar only); without a conductor it must be [`FresnelForm::Exact`].
+    pub fresnel: FresnelForm,
     /// The metal is a modified Phong lobe of reflectance `base_color` (sidecar only): base colour · (metallic · Phong + (1 − metallic) ·
     /// Lambert). Its exponent is (1/α² − 1)/2 with α = roughness², that of a lobe about as wide as GGX's of this α. Only without
     /// transmission, conductor and specular layer: each of them is an error.
@@ -291,6 +294,7 @@ impl Default for Material {
             interior: None,
             boundary: false,
             conductor: None,
+            fresnel: FresnelForm::Exact,
             phong: false,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
