@@ -5,13 +5,14 @@
 //   f_diffuse       base colour (1 - E(wo)) (1 - E(wi)) / (pi (1 - E_avg)), E the albedo of f_layer: reciprocal, and a white base
 //                   gives back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997)
 //   f_transmission  Walter et al. (2007) through solids, with radiance scaled by 1/eta^2; mirrored GGX lobe through thin walls
-//   f_metal         GGX with Schlick's or the exact conductor's Fresnel factor, plus the lobe of Kulla and Conty (2017); or base colour times the
+//   f_metal         GGX with Schlick's or a conductor's Fresnel factor, exact or in the form that it names, plus the lobe of Kulla and Conty (2017); or base colour times the
 //                  modified Phong lobe, for surfaces without layer and transmission
 // Guarantees: never gains energy beyond the interpolation error of the albedo table (stated in bsdf.rs's tests); reflection is
 // reciprocal, transmission up to eta^2; specular 0 without transmission and metal is exactly Lambert. From inside a solid
 // (wo.z < 0) the diffuse base is black: what glTF calls its opaque part absorbs.
 // Frame: z is the shading normal; of a solid it points out of the body. Opaque and thin surfaces scatter alike on both sides.
-// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_PHONG, HAS_SPECULAR_LAYER,
+// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_SCHLICK_CONDUCTOR, HAS_COMPENSATED_CONDUCTOR,
+// HAS_TINTED_CONDUCTOR, HAS_SIMPLIFIED_CONDUCTOR, HAS_PHONG, HAS_SPECULAR_LAYER,
 // HAS_TRANSMISSION, HAS_MULTIPLE_SCATTERING, SEPARABLE_MASKING; `float albedo_table(uint)`, read only if HAS_SPECULAR_LAYER or
 // HAS_MULTIPLE_SCATTERING.
 #ifndef CLERESTORY_TRANSPORT_BSDF_GLSL
@@ -20,6 +21,7 @@
 #include "transport/albedo.glsl"
 #include "transport/choice.glsl"
 #include "transport/fresnel.glsl"
+#include "transport/fresnel_forms.glsl"
 #include "transport/ggx.glsl"
 #include "transport/phong.glsl"
 #include "transport/warp.glsl"
@@ -37,6 +39,11 @@ const uint BSDF_THIN = 1u;        // transmission goes straight through a thin w
 const uint BSDF_CONDUCTOR = 2u;   // the metal is conductor_eta + i conductor_k, not base_color
 const uint BSDF_IMPORTANCE = 4u;  // wo is where particles come from: no 1/eta^2
 const uint BSDF_PHONG = 8u;       // the metal is a modified Phong lobe of reflectance base_color
+// The metal is a conductor in another form than the exact one: what stands in conductor_eta and conductor_k.
+const uint BSDF_SCHLICK_CONDUCTOR = 16u;      // F0
+const uint BSDF_COMPENSATED_CONDUCTOR = 32u;  // F0 and a, with the exponents in conductor_average
+const uint BSDF_TINTED_CONDUCTOR = 64u;       // F0 and b
+const uint BSDF_SIMPLIFIED_CONDUCTOR = 128u;  // eta and k
 
 // A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
 const float ETA_MATCHED = 1.001;
@@ -52,7 +59,7 @@ struct Bsdf {
     float alpha;           // GGX width, which stands for a Phong exponent too; a mirror below ALPHA_MIN
     vec3 conductor_k;
     float transmission;
-    vec3 conductor_average;  // fresnel_conductor_average of the two above
+    vec3 conductor_average;  // cosine-weighted average of the conductor's factor
     float eta;             // index inside / outside; 0 stands for Schlick's factor
     uint flags;
 };
@@ -118,7 +125,36 @@ vec3 metal_fresnel(Bsdf b, float cos_h) {
     if (HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u) {
         return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
     }
+    if (HAS_SCHLICK_CONDUCTOR && (b.flags & BSDF_SCHLICK_CONDUCTOR) != 0u) {
+        return fresnel_schlick(cos_h, b.conductor_eta);
+    }
+    if (HAS_COMPENSATED_CONDUCTOR && (b.flags & BSDF_COMPENSATED_CONDUCTOR) != 0u) {
+        return fresnel_compensated(cos_h, b.conductor_eta, b.conductor_k, b.conductor_average);
+    }
+    if (HAS_TINTED_CONDUCTOR && (b.flags & BSDF_TINTED_CONDUCTOR) != 0u) {
+        return fresnel_tinted(cos_h, b.conductor_eta, b.conductor_k);
+    }
+    if (HAS_SIMPLIFIED_CONDUCTOR && (b.flags & BSDF_SIMPLIFIED_CONDUCTOR) != 0u) {
+        return fresnel_simplified(cos_h, b.conductor_eta, b.conductor_k);
+    }
     return fresnel_schlick(cos_h, b.base_color);
+}
+
+// The flags of the conductors that are compiled in.
+uint conductor_flags() {
+    return (HAS_CONDUCTOR ? BSDF_CONDUCTOR : 0u) | (HAS_SCHLICK_CONDUCTOR ? BSDF_SCHLICK_CONDUCTOR : 0u)
+        | (HAS_COMPENSATED_CONDUCTOR ? BSDF_COMPENSATED_CONDUCTOR : 0u) | (HAS_TINTED_CONDUCTOR ? BSDF_TINTED_CONDUCTOR : 0u)
+        | (HAS_SIMPLIFIED_CONDUCTOR ? BSDF_SIMPLIFIED_CONDUCTOR : 0u);
+}
+
+// Whether the metal is a conductor by its index, in any form, not of a base colour.
+bool bsdf_is_conductor(Bsdf b) { return (b.flags & conductor_flags()) != 0u; }
+
+// Cosine-weighted hemispherical average of a conductor's factor.
+vec3 conductor_average(Bsdf b) {
+    return HAS_COMPENSATED_CONDUCTOR && (b.flags & BSDF_COMPENSATED_CONDUCTOR) != 0u
+        ? fresnel_compensated_average(b.conductor_eta, b.conductor_k, b.conductor_average)
+        : b.conductor_average;
 }
 
 // What the layer reflects of a microfacet (r) and what goes through it (t), as the mask allows.
@@ -187,9 +223,8 @@ CosineLobes cosine_lobes(Bsdf b, float cos_o, bool inside, uint mask) {
         float e_average = albedo_average(0u, b.alpha);
         float loss = 1.0 - e_average;
         if (loss > LOSS_MIN) {
-            bool exact = HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u;
             // 1/21 = 2 int (1 - mu)^5 mu dmu
-            vec3 f = exact ? b.conductor_average : mix(b.base_color, vec3(1.0), 1.0 / 21.0);
+            vec3 f = bsdf_is_conductor(b) ? conductor_average(b) : mix(b.base_color, vec3(1.0), 1.0 / 21.0);
             lobes.metal = m * f * f * e_average / (1.0 - f * loss) * (1.0 - albedo_lookup(0u, cos_o, b.alpha));
             lobes.seen += lobes.metal;
         }

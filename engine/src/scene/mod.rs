@@ -304,6 +304,11 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Whether its metal is, at least in part, a conductor whose Fresnel factor has one of these forms.
+    pub fn has_conductor(&self, forms: &[FresnelForm]) -> bool {
+        self.metallic > 0.0 && self.conductor.is_some() && forms.contains(&self.fresnel)
+    }
+
     /// Smooth, clear glass of a solid body; it needs a closed mesh. Its thickness only marks it as solid.
     pub fn glass(name: impl Into<String>, ior: f32) -> Self {
         Self {

@@ -7,6 +7,7 @@
 //! Cheaper forms of the conductor's factor stand in the modules below, each with its error beside the exact one; [`form`] chooses among them.
 
 pub mod compensated;
+pub mod curve;
 pub mod extinction;
 pub mod form;
 #[cfg(test)]

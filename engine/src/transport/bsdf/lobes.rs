@@ -5,10 +5,14 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::{
-    BSDF_CONDUCTOR, BSDF_IMPORTANCE, BSDF_PHONG, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
+    BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_IMPORTANCE, BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR,
+    BSDF_SIMPLIFIED_CONDUCTOR, BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
     LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
 };
 use crate::transport::albedo::{albedo_average, albedo_layer, albedo_lookup};
+use crate::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
+use crate::transport::fresnel::simplified::fresnel_simplified;
+use crate::transport::fresnel::tinted::fresnel_tinted;
 use crate::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_f0, fresnel_schlick};
 
 /// Reflectances of the two lobes that are sampled by the cosine: the diffuse base and the metal's multiple scattering.
@@ -63,10 +67,43 @@ impl BsdfContext<'_> {
         if self.is_phong(b) {
             return b.base_color;
         }
-        if self.features.conductor && b.flags & BSDF_CONDUCTOR != 0 {
-            return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
+        let [eta, k, exponent] = [b.conductor_eta, b.conductor_k, b.conductor_average];
+        match b.flags & self.conductor_flags() {
+            BSDF_CONDUCTOR => fresnel_conductor(cos_h, eta, k),
+            BSDF_SCHLICK_CONDUCTOR => fresnel_schlick(cos_h, eta),
+            BSDF_COMPENSATED_CONDUCTOR => fresnel_compensated(cos_h, eta, k, exponent),
+            BSDF_TINTED_CONDUCTOR => fresnel_tinted(cos_h, eta, k),
+            BSDF_SIMPLIFIED_CONDUCTOR => fresnel_simplified(cos_h, eta, k),
+            _ => fresnel_schlick(cos_h, b.base_color),
         }
-        fresnel_schlick(cos_h, b.base_color)
+    }
+
+    /// The flags of the conductors that are compiled in.
+    fn conductor_flags(&self) -> u32 {
+        let f = &self.features;
+        [
+            (f.conductor, BSDF_CONDUCTOR),
+            (f.schlick_conductor, BSDF_SCHLICK_CONDUCTOR),
+            (f.compensated_conductor, BSDF_COMPENSATED_CONDUCTOR),
+            (f.tinted_conductor, BSDF_TINTED_CONDUCTOR),
+            (f.simplified_conductor, BSDF_SIMPLIFIED_CONDUCTOR),
+        ]
+        .into_iter()
+        .filter_map(|(on, flag)| on.then_some(flag))
+        .sum()
+    }
+
+    /// Cosine-weighted hemispherical average of a conductor's factor; `None` for a metal by its base colour.
+    fn conductor_average(&self, b: &Bsdf) -> Option<DVec3> {
+        match b.flags & self.conductor_flags() {
+            0 => None,
+            BSDF_COMPENSATED_CONDUCTOR => Some(fresnel_compensated_average(
+                b.conductor_eta,
+                b.conductor_k,
+                b.conductor_average,
+            )),
+            _ => Some(b.conductor_average),
+        }
     }
 
     /// What a microfacet reflects and what goes through it, as the mask allows.
@@ -123,13 +160,9 @@ impl BsdfContext<'_> {
             let e_average = albedo_average(self.table, 0, b.alpha);
             let loss = 1.0 - e_average;
             if loss > LOSS_MIN {
-                let exact = self.features.conductor && b.flags & BSDF_CONDUCTOR != 0;
                 // 1/21 = 2∫(1 − μ)⁵ μ dμ
-                let f = if exact {
-                    b.conductor_average
-                } else {
-                    b.base_color.lerp(DVec3::ONE, 1.0 / 21.0)
-                };
+                let by_color = || b.base_color.lerp(DVec3::ONE, 1.0 / 21.0);
+                let f = self.conductor_average(b).unwrap_or_else(by_color);
                 let escape = f * f * e_average / (DVec3::ONE - f * loss);
                 metal = m * escape * (1.0 - albedo_lookup(self.table, 0, cos_o, b.alpha));
             }

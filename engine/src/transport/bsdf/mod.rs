@@ -6,7 +6,7 @@
 //!   back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997);
 //! - f_transmission: Walter et al. (EGSR 2007) through solids, with radiance scaled by 1/η²; a mirrored GGX lobe through thin walls
 //!   (`KHR_materials_transmission`);
-//! - f_metal: GGX with Schlick's or the exact conductor's Fresnel factor, plus the multiple-scattering lobe of Kulla and Conty (2017); or
+//! - f_metal: GGX with Schlick's or a conductor's Fresnel factor, exact or in the form that it names, plus the multiple-scattering lobe of Kulla and Conty (2017); or
 //!   base colour · the modified Phong lobe ([`phong`](super::phong)), meant for surfaces without layer and transmission, which are then
 //!   base colour · (m Phong + (1 − m) Lambert).
 //!
@@ -26,6 +26,7 @@ use glam::{DVec2, DVec3};
 pub use self::features::{BsdfContext, BsdfFeatures};
 pub use self::label::bsdf_label;
 use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
+pub(crate) use self::parameters::conductor_flag;
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
 use super::choice::choose_first;
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
@@ -51,6 +52,14 @@ pub const LOBE_ALL: u32 = constants::LOBE_ALL;
 pub const BSDF_THIN: u32 = constants::BSDF_THIN;
 /// The metal is `conductor_eta` + i `conductor_k`, not `base_color`.
 pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
+/// The metal is a conductor of normal reflectance `conductor_eta` by Schlick's curve.
+pub const BSDF_SCHLICK_CONDUCTOR: u32 = constants::BSDF_SCHLICK_CONDUCTOR;
+/// The same less a term of coefficient `conductor_k` and exponent `conductor_average`.
+pub const BSDF_COMPENSATED_CONDUCTOR: u32 = constants::BSDF_COMPENSATED_CONDUCTOR;
+/// The same less a term of coefficient `conductor_k` and exponent 6.
+pub const BSDF_TINTED_CONDUCTOR: u32 = constants::BSDF_TINTED_CONDUCTOR;
+/// The metal is `conductor_eta` + i `conductor_k` by the simplified factor.
+pub const BSDF_SIMPLIFIED_CONDUCTOR: u32 = constants::BSDF_SIMPLIFIED_CONDUCTOR;
 /// ωo is where particles come from: refraction is not scaled by 1/η².
 pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
 /// The metal is a modified Phong lobe of constant reflectance `base_color`, of the exponent that `alpha` stands for

@@ -8,9 +8,10 @@ use std::f64::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use super::*;
-use crate::scene::{ConductorIor, Material, phong_roughness};
+use crate::scene::{ConductorIor, FresnelForm, Material, phong_roughness};
 use crate::test_random::Random;
-use crate::transport::albedo::{AlbedoTable, albedo_lookup, integrate_albedos};
+use crate::transport::albedo::{AlbedoTable, albedo_average, albedo_lookup, integrate_albedos};
+use crate::transport::fresnel::form::MetalFresnel;
 use crate::transport::fresnel::{fresnel_dielectric, fresnel_schlick};
 use crate::transport::ggx::{ALPHA_MIN, ggx_stretched_cos};
 use crate::transport::random::{Sampler, SamplerKind, sample_1d, sample_2d};
@@ -98,6 +99,11 @@ fn zoo() -> Vec<(&'static str, Bsdf)> {
         };
         all.push(("phong on lambert", bsdf_gltf(&half).with_phong()));
         all.push(("gold", bsdf_gltf(&metal).with_conductor(&gold)));
+        for form in [FresnelForm::Rescaled, FresnelForm::Hoffman, FresnelForm::Simplified] {
+            all.push((form.name(), bsdf_gltf(&metal).with_conductor_form(&gold, form)));
+        }
+        let compensated = bsdf_gltf(&metal).with_conductor_form(&gold, FresnelForm::Compensated);
+        all.push(("compensated", compensated));
         all.push(("thin", bsdf_gltf(&clear)));
         all.push((
             "solid",
@@ -166,6 +172,52 @@ fn specular_zero_is_exactly_lambert() {
             let s = bsdf_sample(&c, &b, wo, u, LOBE_ALL);
             assert!((s.weight - b.base_color).abs().max_element() < 1e-15);
             assert_eq!(s.flags, LOBE_DIFFUSE & LOBE_REFLECTION);
+        }
+    }
+}
+
+/// A perfect mirror under an even light returns its Fresnel factor, in the form that the material names, and only that form is compiled.
+#[test]
+fn metals_reflect_by_the_form_they_name() {
+    let ior = ConductorIor {
+        eta: Vec3::new(1.9, 1.0, 0.58),
+        k: Vec3::new(8.1, 6.6, 5.3),
+    };
+    for form in FresnelForm::ALL {
+        let material = Material {
+            conductor: Some(ior),
+            fresnel: form,
+            ..Material::mirror("mirror", Vec3::ONE)
+        };
+        let features = BsdfFeatures::of_materials([&material]);
+        let compiled = [
+            features.conductor,
+            features.schlick_conductor,
+            features.compensated_conductor,
+            features.tinted_conductor,
+            features.simplified_conductor,
+        ];
+        assert_eq!(compiled.iter().filter(|on| **on).count(), 1, "{form}: {compiled:?}");
+        assert_eq!(features.conductor, form == FresnelForm::Exact);
+        let b = Bsdf::from_material(&material);
+        let fresnel = MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3());
+        for c in [context(features), context(BsdfFeatures::ALL)] {
+            for i in 1..=100 {
+                let wo = direction(f64::from(i) / 100.0, 0.7);
+                let s = bsdf_sample(&c, &b, wo, random3(i, 31), LOBE_ALL);
+                assert_eq!(s.weight, fresnel.at(wo.z), "{form}, {wo}");
+            }
+            // Rough metals are compensated with the average of the same form.
+            let rough = Bsdf { alpha: 0.5, ..b };
+            let lobes = c.cosine_lobes(&rough, 0.5, false, LOBE_ALL);
+            let loss = 1.0 - albedo_average(c.table, 0, 0.5);
+            let f = fresnel.average();
+            let expected = f * f * (1.0 - loss) / (DVec3::ONE - f * loss) * (1.0 - albedo_lookup(c.table, 0, 0.5, 0.5));
+            assert!(
+                (lobes.metal - expected).abs().max_element() < 1e-12,
+                "{form}: {}",
+                lobes.metal
+            );
         }
     }
 }

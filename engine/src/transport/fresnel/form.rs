@@ -124,8 +124,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/fresnel/form.rs::averages_are_as_published",
         "engine/src/transport/bsdf/tests.rs::metals_reflect_by_the_form_they_name",
     ],
+    shaders: &["shaders/transport/fresnel_curve.comp"],
     experiment: "clerestory metal gold",
-    api: &["clerestory::transport::fresnel::form::MetalFresnel"],
+    api: &[
+        "clerestory::transport::fresnel::form::MetalFresnel",
+        "clerestory::transport::fresnel::curve::FresnelCurve",
+    ],
     settings: &["clerestory::scene::FresnelForm"],
     ..Row::of(file!())
 }];
