@@ -90,7 +90,10 @@ impl Surface {
             let color = base_color(material)?;
             return Ok(match material.conductor {
                 Some(_) if material.fresnel != FresnelForm::Exact => {
-                    return Err(format!("a metal by the form {} of its Fresnel factor has no counterpart", material.fresnel));
+                    return Err(format!(
+                        "a metal by the form {} of its Fresnel factor has no counterpart",
+                        material.fresnel
+                    ));
                 }
                 Some(conductor) => Self::Conductor {
                     eta: conductor.eta,

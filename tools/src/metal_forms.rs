@@ -125,7 +125,10 @@ pub fn split_sphere(exact: &MetalFresnel, below: &MetalFresnel, degrees: f64, si
         (shape(DVec3::new(x, y, z2.sqrt())), y)
     };
     let points: Vec<(f64, f64)> = (0..side * side).map(at).collect();
-    let brightest = points.iter().fold(0.0, |most: f64, (s, _)| most.max(*s)).max(f64::MIN_POSITIVE);
+    let brightest = points
+        .iter()
+        .fold(0.0, |most: f64, (s, _)| most.max(*s))
+        .max(f64::MIN_POSITIVE);
     points
         .into_iter()
         .map(|(s, y)| if y > 0.0 { upper } else { lower } * (s / brightest))
@@ -142,22 +145,11 @@ pub fn sheet(pictures: &[Vec<DVec3>], side: u32, columns: u32) -> Rgb8 {
         for (i, texel) in (0..).zip(picture) {
             let at = ((top + i / side) * width + left + i % side) as usize * 3;
             for (byte, linear) in bytes[at..at + 3].iter_mut().zip(texel.to_array()) {
-                *byte = srgb(linear);
+                *byte = srgb_byte(linear as f32);
             }
         }
     }
     Rgb8 { width, height, bytes }
-}
-
-/// IEC 61966-2-1.
-fn srgb(linear: f64) -> u8 {
-    let x = linear.clamp(0.0, 1.0);
-    let encoded = if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    };
-    (255.0 * encoded).round() as u8
 }
 
 #[cfg(test)]
@@ -168,8 +160,14 @@ mod tests {
     fn errors_are_those_of_the_curve() {
         // Aluminium at 700 nm.
         let found = FormError::of(Way::Form(FresnelForm::Rescaled), 1.9214, 8.1420, STEPS);
-        assert!((found.worst - 0.185).abs() < 5e-4 && (found.at - 0.103).abs() < 1e-3, "{found:?}");
-        assert!((found.mean - 0.0528).abs() < 5e-4 && (found.absolute - 0.1495).abs() < 1e-4, "{found:?}");
+        assert!(
+            (found.worst - 0.185).abs() < 5e-4 && (found.at - 0.103).abs() < 1e-3,
+            "{found:?}"
+        );
+        assert!(
+            (found.mean - 0.0528).abs() < 5e-4 && (found.absolute - 0.1495).abs() < 1e-4,
+            "{found:?}"
+        );
         // Gold at 550 nm, whose printed term is infinite at normal incidence.
         let printed = FormError::of(Way::PrintedRule, 0.4241, 2.4721, STEPS);
         assert!(printed.worst.is_infinite() && printed.at == 1.0, "{printed:?}");
@@ -187,7 +185,10 @@ mod tests {
                 let (row, column) = (i as u32 / side, i as u32 % side);
                 let lower = sphere[((side - 1 - row) * side + column) as usize];
                 let expected = *upper * rescaled.at(c) / exact.at(c);
-                assert!((lower - expected).abs().max_element() < 1e-9, "{degrees}: {upper} {lower}");
+                assert!(
+                    (lower - expected).abs().max_element() < 1e-9,
+                    "{degrees}: {upper} {lower}"
+                );
             }
         }
         let one = sheet(&[vec![DVec3::ONE; 4], vec![DVec3::ZERO; 4]], 2, 2);

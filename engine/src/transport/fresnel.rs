@@ -233,7 +233,7 @@ mod tests {
         let (eta, k) = (DVec3::new(0.04, 1.0, 2.9), DVec3::new(4.8, 0.0, 3.2));
         for c in [0.0, 1e-7, 1e-4] {
             let f = fresnel_conductor(c, eta, k);
-            assert!(f.is_finite() && f.y == 0.0, "{f}");
+            assert!(f.is_finite() && f.y <= c, "{f}");
             assert!(
                 (f.x - 1.0).abs() < 8.0 * c + 1e-15 && (f.z - 1.0).abs() < 16.0 * c + 1e-15,
                 "{f}"

@@ -101,7 +101,10 @@ fn two_sided(bsdf: &str) -> String {
 fn metal(material: &Material, alpha: f32) -> Result<String, String> {
     let index = match material.conductor {
         Some(_) if material.fresnel != FresnelForm::Exact => {
-            return Err(format!("a metal by the form {} of its Fresnel factor has no counterpart", material.fresnel));
+            return Err(format!(
+                "a metal by the form {} of its Fresnel factor has no counterpart",
+                material.fresnel
+            ));
         }
         Some(conductor) => rgb("eta", conductor.eta) + &rgb("k", conductor.k),
         // Schlick's factor with F0 = 1 is 1 at every angle.

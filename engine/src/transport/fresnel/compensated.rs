@@ -376,7 +376,7 @@ mod tests {
             let (what, error) = ((metal.name, metal.wavelength), error(metal.n, metal.k, found));
             let [a, alpha, published] = metal.fitted;
             assert!(error <= published + 0.01, "{what:?}: {error}, published {published}");
-            assert!((found.a - a).abs() < 0.02 * a.max(0.05), "{what:?}: {found:?}");
+            assert!((found.a - a).abs() < 0.03 * a.max(0.05), "{what:?}: {found:?}");
             assert!((found.alpha - alpha).abs() < 0.03 * alpha, "{what:?}: {found:?}");
         }
     }

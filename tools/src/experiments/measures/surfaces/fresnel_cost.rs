@@ -99,7 +99,9 @@ impl Study for Found {
         let exact = of(CurveForm::Exact).cloned().unwrap_or_default();
         let rows = forms.iter().zip(&times).map(|(form, time)| {
             let place = PUBLISHED_TIMES.iter().position(|(other, _)| other == form);
-            let faster = place.and_then(|place| place.checked_sub(1)).and_then(|place| of(PUBLISHED_TIMES[place].0));
+            let faster = place
+                .and_then(|place| place.checked_sub(1))
+                .and_then(|place| of(PUBLISHED_TIMES[place].0));
             Row {
                 form: device_name(*form),
                 time: time.clone(),

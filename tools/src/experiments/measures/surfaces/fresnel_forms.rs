@@ -236,7 +236,16 @@ pub fn device_name(form: CurveForm) -> String {
 fn device(context: &Context<'_>) -> Result<Vec<Device>> {
     let gpu = (context.gpu)()?;
     let count = context.pick(STEPS + 1, 101);
-    let names = ["silver", "gold", "copper", "aluminium", "iron", "chromium", "nickel", "titanium"];
+    let names = [
+        "silver",
+        "gold",
+        "copper",
+        "aluminium",
+        "iron",
+        "chromium",
+        "nickel",
+        "titanium",
+    ];
     let names = context.first(&names, 2);
     let of = |form: CurveForm| {
         let (mut error, mut relative, mut values) = (0.0f64, 0.0f64, 0);
@@ -283,7 +292,11 @@ impl Study for Found {
         let cases: Vec<(&str, f64, Option<&Published>)> = PUBLISHED
             .iter()
             .map(|published| (published.metal, published.wavelength, Some(published)))
-            .chain(HAGEMANN.iter().flat_map(|(metal, wavelengths)| wavelengths.map(|wavelength| (*metal, wavelength, None))))
+            .chain(
+                HAGEMANN
+                    .iter()
+                    .flat_map(|(metal, wavelengths)| wavelengths.map(|wavelength| (*metal, wavelength, None))),
+            )
             .collect();
         let name = |(metal, wavelength, _): &(&str, f64, _)| format!("{metal} at {wavelength} nm");
         let errors = context.each(&cases, name, |(metal, wavelength, published)| {
@@ -307,7 +320,10 @@ impl Study for Found {
     fn findings(&self) -> Findings {
         let of_metal = |metal: &str| -> Vec<Point> {
             let is = |point: &&Point| {
-                point.metal == metal && point.form != FresnelForm::Exact.name() && point.error > 1e-9 && point.error.is_finite()
+                point.metal == metal
+                    && point.form != FresnelForm::Exact.name()
+                    && point.error > 1e-9
+                    && point.error.is_finite()
             };
             self.points.iter().filter(is).cloned().collect()
         };

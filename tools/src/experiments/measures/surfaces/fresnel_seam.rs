@@ -76,7 +76,11 @@ impl Study for Found {
         let mut rows = Vec::new();
         for (angle, published) in PUBLISHED {
             let c = angle.to_radians().cos();
-            let [at, step, left] = [exact.at(c), rescaled.at(c) - exact.at(c), compensated.at(c) - exact.at(c)];
+            let [at, step, left] = [
+                exact.at(c),
+                rescaled.at(c) - exact.at(c),
+                compensated.at(c) - exact.at(c),
+            ];
             for (band, name) in ["red", "green", "blue"].into_iter().enumerate() {
                 rows.push(Row {
                     angle,
@@ -113,7 +117,10 @@ impl Study for Found {
             return findings;
         }
         findings
-            .picture(PICTURES[0], "From 90° (top left) to 50° of incidence, exact above, rescaled below")
+            .picture(
+                PICTURES[0],
+                "From 90° (top left) to 50° of incidence, exact above, rescaled below",
+            )
             .picture(PICTURES[1], "The same, compensated below")
     }
 }
