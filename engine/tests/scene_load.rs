@@ -131,7 +131,7 @@ fn the_sidecar_of_the_reference_is_understood() {
     assert!(scene.notes.is_empty(), "{:?}", scene.notes);
     let media = SceneProfile::of(&scene).media;
     assert!(media.surrounding && media.boundaries && media.heterogeneous && media.count == 2);
-    assert!(scene.materials[3].interior == Some(1) && scene.media[1].density.is_some());
+    assert!(scene.materials[6].interior == Some(1) && scene.media[1].density.is_some());
 }
 
 #[test]

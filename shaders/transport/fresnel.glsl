@@ -2,7 +2,7 @@
 //
 // Sources: dielectric and conductor forms from Fresnel's equations (Born and Wolf, Principles of Optics, 1.5 and 14.2);
 // Schlick, "An Inexpensive BRDF Model for Physically-based Rendering" (1994).
-// Guarantees: results lie in [0, 1]; total internal reflection gives exactly 1; equal indices give exactly 0.
+// Guarantees: results lie in [0, 1]; total internal reflection gives exactly 1; equal indices give exactly 0 off grazing.
 #ifndef CLERESTORY_TRANSPORT_FRESNEL_GLSL
 #define CLERESTORY_TRANSPORT_FRESNEL_GLSL
 
@@ -26,7 +26,7 @@ float fresnel_dielectric(float cos_i, float eta) {
     return min(1.0, 0.5 * a * a * (1.0 + b * b));
 }
 
-// What keeps the one case of 0/0 defined: no interface (eta = 1, k = 0) at grazing incidence, which reflects nothing.
+// What keeps the one case of 0/0 defined: no interface (eta = 1, k = 0) at a cosine of 0, which reflects nothing.
 const float LEAST_SUM = 1e-30;
 
 // Exact conductor against vacuum, per band; complex index eta + i k.

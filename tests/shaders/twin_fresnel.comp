@@ -11,6 +11,7 @@ vec4 fresnel_table(uint index) {
 
 #include "transport/fresnel_forms.glsl"
 #include "transport/fresnel_table.glsl"
+#include "transport/microfacets.glsl"
 
 void main() {
     if (twin_case() >= push.case_count) {
@@ -29,6 +30,18 @@ void main() {
         out3(3u, fresnel_tinted(cos_i, in3(7u), in3(10u)));
         out3(6u, fresnel_schlick_average(in3(7u)));
         out3(9u, fresnel_compensated_average(in3(7u), in3(10u), in3(13u)));
+        break;
+    }
+    case 3u: {  // microfacets: l, v, slope, exponent, numbers
+        vec3 l = in3(0u);
+        vec3 v = in3(3u);
+        vec3 h = normalize(l + v);
+        out1(0u, beckmann_d(h, in1(6u)));
+        out1(1u, cosine_lobe_d(h, in1(7u)));
+        out1(2u, cook_torrance_g(l, v, h));
+        out1(3u, kelemen_g(l, h));
+        out3(4u, beckmann_sample(in1(6u), in2(8u)));
+        out3(7u, cosine_lobe_sample(in1(7u), in2(8u)));
         break;
     }
     case 2u: {  // with the geometric term

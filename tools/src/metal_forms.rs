@@ -2,6 +2,7 @@
 
 use clerestory::film::png::Rgb8;
 use clerestory::scene::FresnelForm;
+use clerestory::srgb::srgb_byte;
 use clerestory::transport::fresnel::compensated::rule;
 use clerestory::transport::fresnel::form::MetalFresnel;
 use clerestory::transport::fresnel::fresnel_conductor;
@@ -145,7 +146,7 @@ pub fn sheet(pictures: &[Vec<DVec3>], side: u32, columns: u32) -> Rgb8 {
         for (i, texel) in (0..).zip(picture) {
             let at = ((top + i / side) * width + left + i % side) as usize * 3;
             for (byte, linear) in bytes[at..at + 3].iter_mut().zip(texel.to_array()) {
-                *byte = srgb_byte(linear as f32);
+                *byte = srgb_byte(linear);
             }
         }
     }

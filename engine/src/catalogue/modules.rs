@@ -89,6 +89,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::transport::light_tree::ROWS,
     crate::transport::lights::ROWS,
     crate::transport::medium::ROWS,
+    crate::transport::microfacets::ROWS,
     crate::transport::path_set::ROWS,
     crate::transport::phase::ROWS,
     crate::transport::phong::ROWS,

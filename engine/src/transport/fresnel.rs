@@ -2,7 +2,7 @@
 //!
 //! Sources: dielectric and conductor forms from Fresnel's equations (Born and Wolf, Principles of Optics, 1.5 and 14.2); Schlick,
 //! "An Inexpensive BRDF Model for Physically-based Rendering" (1994). Guarantees: results lie in [0, 1]; total internal reflection
-//! gives exactly 1; equal indices give exactly 0. Twin of `transport/fresnel.glsl`.
+//! gives exactly 1; equal indices give exactly 0 off grazing. Twin of `transport/fresnel.glsl`.
 //!
 //! Cheaper forms of the conductor's factor stand in the modules below, each with its error beside the exact one; [`form`] chooses among them.
 
@@ -42,7 +42,7 @@ pub fn fresnel_dielectric(cos_i: f64, eta: f64) -> f64 {
     (0.5 * a * a * (1.0 + b * b)).min(1.0)
 }
 
-/// What keeps the one case of 0/0 defined: no interface (η = 1, k = 0) at grazing incidence, which reflects nothing.
+/// What keeps the one case of 0/0 defined: no interface (η = 1, k = 0) at a cosine of 0, which reflects nothing.
 const LEAST_SUM: f64 = constants::LEAST_SUM as f64;
 
 /// Exact conductor against vacuum, per band; complex index `eta` + i `k`.

@@ -7,11 +7,14 @@ use clerestory::transport::fresnel::rescaled::{conductor_f0, fresnel_rescaled, f
 use clerestory::transport::fresnel::simplified::fresnel_simplified;
 use clerestory::transport::fresnel::table::{fresnel_table, fresnel_table_lookup};
 use clerestory::transport::fresnel::tinted::fresnel_tinted;
+use clerestory::transport::microfacets::{
+    beckmann_d, beckmann_sample, cook_torrance_g, cosine_lobe_d, cosine_lobe_sample, kelemen_g,
+};
 use clerestory_tests::random::Random;
-use clerestory_tests::twin::{Case, Tolerance, U, compare};
+use clerestory_tests::twin::{Case, Tolerance, U, compare, trigonometric_error};
 use clerestory_tests::{twin_kernel, with_gpu};
 
-use crate::{cases, join, list, twin_math, ulps, v3};
+use crate::{cases, join, list, twin_math, ulps, v2, v3};
 
 twin_kernel!(twin_fresnel);
 
@@ -99,8 +102,8 @@ fn the_conductor_in_single_precision_is_the_complex_form() {
         }
         assert!(worst < 1e-6, "{worst:e}");
         println!("conductors: {worst:.2e}");
-        // No interface reflects nothing, at grazing incidence too.
-        let nothing = [0.0, 1e-7, 0.5, 1.0].map(|c| Case::new(&[c, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]));
+        // No interface reflects nothing, at a cosine of 0 too; just above it the root of what rounding leaves of 1 − 1 is all there is.
+        let nothing = [0.0, 0.01, 0.5, 1.0].map(|c| Case::new(&[c, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]));
         for result in twin_math(gpu, 2, &nothing, &[]) {
             assert!(result.vector(5).max_element() <= 1e-6, "{}", result.vector(5));
         }
@@ -120,5 +123,52 @@ fn tables_agree_with_their_twin() {
             fresnel_table_lookup(&nodes, x[0]).to_array().to_vec()
         });
         println!("table: {worst:.3} of what is allowed");
+    });
+}
+
+#[test]
+fn microfacets_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(43, |r| {
+            let [l, v] = [0, 1].map(|_| {
+                let w = r.direction();
+                glam::Vec3::new(w.x, w.y, w.z.abs().max(0.02)).normalize()
+            });
+            let (slope, exponent) = (r.choose(&[0.1, 0.3, 0.5, 1.0]), r.choose(&[5.0, 10.0, 50.0, 200.0]));
+            join(&[
+                &l.to_array(),
+                &v.to_array(),
+                &[slope, exponent, r.unit(), r.range(0.0, 0.999)],
+            ])
+        });
+        let results = twin_fresnel(gpu, 3, &table, &[]);
+        // Exponents of up to 200 magnify the rounding of the half vector, and Vulkan's exponentials that of their argument.
+        let tolerance = Tolerance {
+            input_size: 1.0,
+            ..ulps(1024.0, 16.0, 1e-30)
+        };
+        let worst = compare("microfacets", &table, &results, tolerance, 0..8, |x| {
+            let (l, v) = (v3(x, 0), v3(x, 3));
+            let h = (l + v).normalize();
+            vec![
+                beckmann_d(h, x[6]),
+                cosine_lobe_d(h, x[7]),
+                cook_torrance_g(l, v, h),
+                kelemen_g(l, h),
+            ]
+        });
+        println!("microfacets: {worst:.3} of what is allowed");
+        let trig = trigonometric_error(gpu);
+        for (case, result) in table.iter().zip(&results) {
+            let x = case.0.map(f64::from);
+            let u = v2(&x, 8);
+            for (place, expected) in [(4, beckmann_sample(x[6], u)), (7, cosine_lobe_sample(x[7], u))] {
+                let difference = (result.vector(place) - expected).length();
+                // The sine is a root of what is left of one.
+                let sine = (1.0 - expected.z * expected.z).sqrt();
+                let bound = 4.0 * trig + (16.0 * U).sqrt().min(16.0 * U / sine);
+                assert!(difference <= bound, "{difference:e} > {bound:e}, {x:?}");
+            }
+        }
     });
 }

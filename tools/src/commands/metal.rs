@@ -244,7 +244,9 @@ fn costs(arguments: &Arguments, ior: &ConductorIor) -> Outcome<Vec<Cost>> {
             }
         }
     }
-    check_validation(gpu.validation())?;
+    let log = gpu.validation_log();
+    drop((kernels, gpu));
+    check_validation(&log)?;
     let medians: Vec<f64> = times.into_iter().map(median).collect();
     let exact = forms
         .iter()

@@ -19,9 +19,11 @@ sources! {
     ANDERSSON_2020 = "andersson-2020": "P. Andersson, J. Nilsson, T. Akenine-Möller, M. Oskarsson, K. Åström, M. Fairchild", "FLIP: A Difference Evaluator for Alternating Images", "HPG", 2020;
     APETREI_2014 = "apetrei-2014": "C. Apetrei", "Fast and Simple Agglomerative LBVH Construction", "EG UK CGVC", 2014;
     ASHKIANI_2016 = "ashkiani-2016": "S. Ashkiani, A. Davidson, U. Meyer, J. Owens", "GPU Multisplit", "PPoPP", 2016;
+    BECKMANN_SPIZZICHINO_1963 = "beckmann-spizzichino-1963": "P. Beckmann, A. Spizzichino", "The Scattering of Electromagnetic Waves from Rough Surfaces", "Pergamon Press", 1963;
     BELLMAN_1961 = "bellman-1961": "R. Bellman", "On the Approximation of Curves by Line Segments Using Dynamic Programming", "CACM 4(6)", 1961;
     BLASI_1993 = "blasi-1993": "P. Blasi, B. Le Saëc, C. Schlick", "A Rendering Algorithm for Discrete Volume Density Objects", "CGF 12(3)", 1993;
     BLELLOCH_1990 = "blelloch-1990": "G. Blelloch", "Prefix Sums and Their Applications", "CMU-CS-90-190", 1990;
+    BLINN_1977 = "blinn-1977": "J. Blinn", "Models of Light Reflection for Computer Synthesized Pictures", "SIGGRAPH", 1977;
     BLINN_NEWELL_1976 = "blinn-newell-1976": "J. Blinn, M. Newell", "Texture and Reflection in Computer Generated Images", "CACM 19(10)", 1976;
     BORN_WOLF_1999 = "born-wolf-1999": "M. Born, E. Wolf", "Principles of Optics, 7th edition", "Cambridge University Press", 1999;
     BURLEY_2020 = "burley-2020": "B. Burley", "Practical Hash-based Owen Scrambling", "JCGT 10(4)", 2020;
@@ -30,6 +32,7 @@ sources! {
     CLARBERG_2008 = "clarberg-2008": "P. Clarberg", "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", "JGT 13(3)", 2008;
     COLEMAN_1968 = "coleman-1968": "W. Coleman", "Mathematical Verification of a Certain Monte Carlo Sampling Technique", "Nuclear Science and Engineering 32", 1968;
     CONTY_KULLA_2018 = "conty-kulla-2018": "A. Conty Estevez, C. Kulla", "Importance Sampling of Many Lights with Adaptive Tree Splitting", "PACMCGIT 1(2) (HPG)", 2018;
+    COOK_TORRANCE_1982 = "cook-torrance-1982": "R. Cook, K. Torrance", "A Reflectance Model for Computer Graphics", "ACM TOG 1(1)", 1982;
     CORNELL_BOX_DATA = "cornell-box-data": "Cornell University Program of Computer Graphics", "Cornell Box Data", "graphics.cornell.edu/online/box/data.html", 0;
     CROW_1984 = "crow-1984": "F. Crow", "Summed-Area Tables for Texture Mapping", "SIGGRAPH", 1984;
     DEERING_1988 = "deering-1988": "M. Deering et al.", "The Triangle Processor and Normal Vector Shader", "SIGGRAPH", 1988;
