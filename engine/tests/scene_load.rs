@@ -114,7 +114,7 @@ fn the_sidecar_of_the_reference_is_understood() {
         .and_then(|rest| rest.split("```").next());
     let folder = folder(block.expect("a TOML block"));
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("file");
-    let more = ["bowl", "vase", "cup", "coin", "floor", "bounds"];
+    let more = ["bowl", "vase", "cup", "coin", "pan", "floor", "bounds"];
     let faces = more.map(|name| format!("usemtl {name}\nf 1 3 2\n")).concat();
     let materials = more.map(|name| format!("newmtl {name}\nKd 0.5 0.5 0.5\n")).concat();
     write("m.obj", &format!("{OBJ}{faces}"));
@@ -125,18 +125,19 @@ fn the_sidecar_of_the_reference_is_understood() {
     assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
     assert!(scene.materials[2..5].iter().all(|metal| metal.conductor.is_some()));
     assert_eq!(scene.materials[2].fresnel, scene::FresnelForm::Compensated);
-    assert!(scene.materials[5].phong && scene.materials[5].metallic == 0.4);
+    assert!(scene.materials[5].microfacets.is_some() && scene.materials[2].microfacets.is_none());
+    assert!(scene.materials[6].phong && scene.materials[6].metallic == 0.4);
     assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
     assert_eq!(scene.defaults.aspect, Some(1.5));
     assert!(scene.notes.is_empty(), "{:?}", scene.notes);
     let media = SceneProfile::of(&scene).media;
     assert!(media.surrounding && media.boundaries && media.heterogeneous && media.count == 2);
-    assert!(scene.materials[6].interior == Some(1) && scene.media[1].density.is_some());
+    assert!(scene.materials[7].interior == Some(1) && scene.media[1].density.is_some());
 }
 
 #[test]
 fn metals_are_named_measured_or_coloured_and_name_their_form() {
-    use clerestory::scene::FresnelForm;
+    use clerestory::scene::{Distribution, FresnelForm, Geometry, Microfacets};
     let load_metal = |text: &str| {
         let folder = folder(&format!("[metals]\nring = {text}\n"));
         std::fs::write(folder.path().join("n k.csv"), "380, 0.5, 2.0\n780, 0.5, 2.0\n").expect("file");
@@ -177,6 +178,25 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         let message = refusal(&format!("[metals]\nring = {text}\n"));
         assert!(message.contains(words), "{text}: {message}");
     }
+    let beckmann = load_metal("{ metal = \"gold\", distribution = \"beckmann\" }");
+    let microfacets = beckmann.materials[0].microfacets.expect("microfacets");
+    assert_eq!(
+        (microfacets.distribution, microfacets.geometry),
+        (Distribution::Beckmann, Geometry::CookTorrance)
+    );
+    assert!(SceneProfile::of(&beckmann).has_classic_microfacets);
+    let simplified = load_metal("{ metal = \"gold\", geometry = \"simplified\" }").materials[0].microfacets;
+    assert_eq!(
+        simplified,
+        Some(Microfacets {
+            distribution: Distribution::Ggx,
+            geometry: Geometry::Simplified,
+        })
+    );
+    let mut partial = beckmann;
+    partial.materials[0].metallic = 0.5;
+    let message = partial.check().expect_err("half a metal").to_string();
+    assert!(message.contains("microfacets"), "{message}");
     // A form needs an index.
     let mut scene = load_metal("\"gold\"");
     scene.materials[0].conductor = None;

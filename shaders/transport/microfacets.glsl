@@ -6,6 +6,7 @@
 #ifndef CLERESTORY_TRANSPORT_MICROFACETS_GLSL
 #define CLERESTORY_TRANSPORT_MICROFACETS_GLSL
 
+#include "transport/phong.glsl"
 #include "transport/warp.glsl"
 
 // Below this cosine of microfacet incidence the simplified term is cut off.
@@ -19,7 +20,14 @@ float beckmann_d(vec3 h, float m) {
 }
 
 // The cosine lobe's density, of exponent s.
-float cosine_lobe_d(vec3 h, float s) { return h.z > 0.0 ? (s + 2.0) * (0.5 * INV_PI) * pow(h.z, s) : 0.0; }
+// cos^s comes from the sine, so that narrow lobes keep their digits.
+float cosine_lobe_d(vec3 h, float s) {
+    float sin2 = dot(h.xy, h.xy);
+    return h.z > 0.0 && sin2 < 1.0 ? (s + 2.0) * (0.5 * INV_PI) * exp(0.5 * s * log_below_one(sin2)) : 0.0;
+}
+
+// The exponent of the lobe that is about as wide as Beckmann's and GGX's of a width: 0 for 1 (Walter et al. 2007, 5.2).
+float cosine_lobe_exponent(float alpha) { return 2.0 / (alpha * alpha) - 2.0; }
 
 vec3 normal_at(float cos_theta, float sin_theta, float u) {
     float phi = 2.0 * PI * u;
@@ -28,14 +36,14 @@ vec3 normal_at(float cos_theta, float sin_theta, float u) {
 
 // Normals by their density times their cosine.
 vec3 beckmann_sample(float m, vec2 u) {
-    float tan2 = -m * m * log(1.0 - u.y);
+    float tan2 = -m * m * log_below_one(u.y);
     float cos_theta = inversesqrt(1.0 + tan2);
     return normal_at(cos_theta, cos_theta * sqrt(tan2), u.x);
 }
 
 vec3 cosine_lobe_sample(float s, vec2 u) {
-    float cos_theta = pow(1.0 - u.y, 1.0 / (s + 2.0));
-    return normal_at(cos_theta, sqrt(max(0.0, 1.0 - cos_theta * cos_theta)), u.x);
+    float sin2 = exp_below_one(-2.0 * log_below_one(u.y) / (s + 2.0));
+    return normal_at(sqrt(1.0 - sin2), sqrt(sin2), u.x);
 }
 
 float cook_torrance_g(vec3 l, vec3 v, vec3 h) {

@@ -112,6 +112,9 @@ Bsdf surface_bsdf(SceneMaterial m, Surface s) {
         b.conductor_average = m.conductor_average;
         b.flags |= form;
     }
+    if (HAS_CLASSIC_MICROFACETS) {
+        b.flags |= (m.flags >> MATERIAL_FORM_SHIFT) & BSDF_CLASSIC_FLAGS;
+    }
     if (HAS_PHONG && (m.flags & MATERIAL_PHONG) != 0u) {
         b.flags |= BSDF_PHONG;
     }

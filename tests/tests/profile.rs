@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use clerestory::gpu::{Category, Gpu, PipelineInfo};
 use clerestory::scene::{
-    AlphaMode, Camera, Environment, Filter, FresnelForm, Image, LightKind, Material, Mesh, Scene, Texture, Wrap, metals,
+    AlphaMode, Camera, Environment, Filter, FresnelForm, Image, LightKind, Material, Mesh, Microfacets, Scene, Texture,
+    Wrap, metals,
 };
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::environment::EnvironmentTables;
@@ -149,6 +150,15 @@ fn features_are_those_of_the_scene() {
                 "simplified",
                 metal_of(FresnelForm::Simplified),
                 &["has_metal", "has_multiple_scattering", "has_simplified_conductor"],
+            ),
+            (
+                "classical",
+                {
+                    let mut scene = metal_of(FresnelForm::Exact);
+                    scene.materials[0].microfacets = Some(Microfacets::default());
+                    scene
+                },
+                &["has_metal", "has_conductor", "has_classic_microfacets"],
             ),
             ("lamp", lamp, &["has_area_lights"]),
             ("sun", sun, &["has_punctual_lights"]),
@@ -301,6 +311,12 @@ fn with_everything(mut scene: Scene) -> Scene {
     };
     point_triangle(&mut scene, everything, place);
     point_triangle(&mut scene, Material::phong("phong", Vec3::splat(0.5), 0.5, 20.0), place);
+    let classic = Material {
+        conductor: metals::by_name("copper"),
+        microfacets: Some(Microfacets::default()),
+        ..Material::default()
+    };
+    point_triangle(&mut scene, classic, place);
     for fresnel in FresnelForm::ALL {
         let metal = Material {
             conductor: metals::by_name("copper"),
@@ -348,6 +364,7 @@ fn features_that_are_compiled_in_without_need_change_no_bit() {
                 "has_compensated_conductor",
                 "has_tinted_conductor",
                 "has_simplified_conductor",
+                "has_classic_microfacets",
                 "has_phong",
                 "has_specular_layer",
                 "has_transmission",

@@ -229,6 +229,19 @@ fn check_material(material: &Material, images: usize) -> Result<(), Fault> {
     } else if material.fresnel != FresnelForm::Exact {
         return Err(("fresnel".into(), format!("{} needs a conductor", material.fresnel)));
     }
+    if material.microfacets.is_some() {
+        let sound = material.metallic == 1.0
+            && material.metallic_roughness_texture.is_none()
+            && material.transmission == 0.0
+            && !material.phong;
+        if !sound {
+            return Err((
+                "microfacets".into(),
+                "are those of a metal: metallic 1 without a texture of it, no transmission, no modified Phong model"
+                    .into(),
+            ));
+        }
+    }
     if material.phong {
         let others = [
             ("transmission", material.transmission > 0.0),

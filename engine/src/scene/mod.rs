@@ -10,6 +10,7 @@ mod files;
 pub mod gltf;
 pub mod medium;
 pub mod metals;
+mod microfacets;
 mod mtl;
 pub mod normal_map;
 mod obj;
@@ -23,6 +24,7 @@ pub use files::{LoadOptions, Loaded, load, load_with};
 pub(crate) use medium::mean_density;
 pub use medium::{DensityGrid, MajorantGrid, Medium, Phase};
 pub use metals::FresnelForm;
+pub use microfacets::{Distribution, Geometry, Microfacets};
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, MediaUse, PhaseUse, SceneProfile, TransmissionUse};
 
 use glam::{DAffine3, Vec2, Vec3, Vec4};
@@ -245,6 +247,9 @@ pub struct Material {
     pub conductor: Option<ConductorIor>,
     /// How the conductor's reflectance follows from its index (sidecar only); without a conductor it must be [`FresnelForm::Exact`].
     pub fresnel: FresnelForm,
+    /// Classical microfacets in place of GGX under Smith's masking (sidecar only), for a metal alone: metallic must be 1, without a texture of it and without
+    /// transmission and the modified Phong model.
+    pub microfacets: Option<Microfacets>,
     /// The metal is a modified Phong lobe of reflectance `base_color` (sidecar only): base colour · (metallic · Phong + (1 − metallic) ·
     /// Lambert). Its exponent is (1/α² − 1)/2 with α = roughness², that of a lobe about as wide as GGX's of this α. Only without
     /// transmission, conductor and specular layer: each of them is an error.
@@ -295,6 +300,7 @@ impl Default for Material {
             boundary: false,
             conductor: None,
             fresnel: FresnelForm::Exact,
+            microfacets: None,
             phong: false,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,

@@ -144,6 +144,8 @@ pub struct SceneProfile {
     pub has_conductor: bool,
     /// Some metal's Fresnel factor has another form than the exact one.
     pub has_fitted_conductor: bool,
+    /// Some metal has classical microfacets.
+    pub has_classic_microfacets: bool,
     /// Some metal is a modified Phong lobe.
     pub has_phong: bool,
     /// Some non-metal reflects specularly.
@@ -207,6 +209,7 @@ impl SceneProfile {
             has_metal: false,
             has_conductor: false,
             has_fitted_conductor: false,
+            has_classic_microfacets: false,
             has_phong: false,
             has_rough_dielectric_spec: false,
             transmission: TransmissionUse {
@@ -302,6 +305,7 @@ impl SceneProfile {
         let conductor = metallic[1] > 0.0 && material.conductor.is_some();
         self.has_conductor |= conductor;
         self.has_fitted_conductor |= conductor && material.fresnel != FresnelForm::Exact;
+        self.has_classic_microfacets |= material.microfacets.is_some();
         self.has_phong |= metallic[1] > 0.0 && material.phong;
         self.has_rough_dielectric_spec |= reflects;
         if transmits {
@@ -419,6 +423,7 @@ impl fmt::Display for SceneProfile {
             ("metal", self.has_metal),
             ("measured metal", self.has_conductor),
             ("metal by a form of its Fresnel factor", self.has_fitted_conductor),
+            ("classical microfacets", self.has_classic_microfacets),
             ("modified Phong", self.has_phong),
             ("dielectric reflection", self.has_rough_dielectric_spec),
             ("solid transmission", self.transmission.solid),

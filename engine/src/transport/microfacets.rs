@@ -7,7 +7,8 @@
 //! (2001). Geometric terms hold the 1/(4 (n·l)(n·v)) of the product. Guarantees: reciprocal; with either term no more light leaves than comes in, at any
 //! slope: Cook and Torrance's loses up to 0.55 of it at slope 1, the simplified one up to 0.63. The simplified term is nowhere above Cook and
 //! Torrance's: with n·l + n·v = 2 (l·h)(n·h), their ratio is (n·l)(n·v)/(l·h)² ≤ (n·h)² where nothing is masked, else the greater of the two cosines
-//! over their sum. The path tracer uses GGX ([`ggx`](super::ggx)). Twin of `transport/microfacets.glsl`; all directions
+//! over their sum. Metals take them by
+//! [`Material::microfacets`](crate::scene::Material); without, the engine uses GGX ([`ggx`](super::ggx)). Twin of `transport/microfacets.glsl`; all directions
 //! in the frame whose z is the normal.
 
 use glam::{DVec2, DVec3};
@@ -30,11 +31,17 @@ pub fn beckmann_d(h: DVec3, m: f64) -> f64 {
 
 /// The cosine lobe's density of microfacet normals, of exponent `s`, sr⁻¹.
 pub fn cosine_lobe_d(h: DVec3, s: f64) -> f64 {
-    if h.z > 0.0 {
-        (s + 2.0) * (0.5 * FRAC_1_PI) * h.z.powf(s)
+    let sin2 = h.truncate().length_squared();
+    if h.z > 0.0 && sin2 < 1.0 {
+        (s + 2.0) * (0.5 * FRAC_1_PI) * (0.5 * s * (-sin2).ln_1p()).exp()
     } else {
         0.0
     }
+}
+
+/// The exponent of the lobe that is about as wide as Beckmann's and GGX's of width `alpha`: 0 for 1 (Walter et al. 2007, §5.2).
+pub fn cosine_lobe_exponent(alpha: f64) -> f64 {
+    2.0 / (alpha * alpha) - 2.0
 }
 
 fn normal_at(cos_theta: f64, sin_theta: f64, u: f64) -> DVec3 {
@@ -51,8 +58,8 @@ pub fn beckmann_sample(m: f64, u: DVec2) -> DVec3 {
 
 /// A normal by the density [`cosine_lobe_d`] times its cosine.
 pub fn cosine_lobe_sample(s: f64, u: DVec2) -> DVec3 {
-    let cos_theta = (1.0 - u.y).powf(1.0 / (s + 2.0));
-    normal_at(cos_theta, (1.0 - cos_theta * cos_theta).max(0.0).sqrt(), u.x)
+    let sin2 = -(2.0 * (-u.y).ln_1p() / (s + 2.0)).exp_m1();
+    normal_at((1.0 - sin2).sqrt(), sin2.sqrt(), u.x)
 }
 
 /// Density per solid angle of the direction that a normal of density `d` reflects, drawn by its density times its cosine.
@@ -76,23 +83,23 @@ pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "MET-B3",
         name: "Beckmann distribution of microfacets",
-        role: Role::Kernel,
-        limits: "Isotropic; a host composes it, since the path tracer's materials have GGX alone.",
+        role: Role::PartOf("BG-3"),
+        limits: "Isotropic metals alone, uncompensated for multiple scattering, and not in the preview.",
         sources: &[sources::BECKMANN_SPIZZICHINO_1963.whole()],
         ..ROW
     },
     Row {
         id: "MET-B4",
         name: "cosine-lobe distribution of microfacets",
-        role: Role::Kernel,
-        limits: "Isotropic, without the tail of real surfaces; a host composes it.",
+        role: Role::PartOf("BG-3"),
+        limits: "Isotropic metals alone, without the tail of real surfaces.",
         sources: &[sources::BLINN_1977.whole()],
         ..ROW
     },
     Row {
         id: "MET-B5",
         name: "geometric term of Cook and Torrance",
-        role: Role::Kernel,
+        role: Role::PartOf("BG-3"),
         limits: "Grooves of one shape for all distributions; loses up to 0.55 of the light at Beckmann slope 1.",
         sources: &[sources::COOK_TORRANCE_1982.whole()],
         ..ROW
@@ -100,7 +107,7 @@ pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "MET-B6",
         name: "simplified geometric term of one cosine",
-        role: Role::Kernel,
+        role: Role::PartOf("BG-3"),
         limits: "Gains no light, since it is nowhere above Cook and Torrance's term, but loses up to 0.63 of it at Beckmann slope 1, and is infinite where light and viewer are opposite, but for a cut.",
         sources: &[sources::KELEMEN_SZIRMAY_KALOS_2001.whole()],
         ..ROW
@@ -114,10 +121,13 @@ const ROW: Row = Row {
         "engine/src/transport/microfacets.rs::distributions_are_normalised",
         "engine/src/transport/microfacets.rs::reflections_are_reciprocal_and_gain_nothing",
         "engine/src/transport/microfacets.rs::samples_follow_their_density",
+        "engine/src/transport/bsdf/tests.rs::classical_metals_are_the_product_of_their_parts",
         "tests/tests/twins/fresnel_forms.rs::microfacets_agree_with_their_twins",
+        "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
     ],
     experiment: "clerestory metal gold",
     api: &["clerestory::transport::microfacets"],
+    settings: &["clerestory::scene::Microfacets"],
     ..Row::of(file!())
 };
 

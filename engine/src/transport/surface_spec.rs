@@ -17,6 +17,7 @@ macro_rules! surface_spec {
             has_compensated_conductor: bsdf.compensated_conductor,
             has_tinted_conductor: bsdf.tinted_conductor,
             has_simplified_conductor: bsdf.simplified_conductor,
+            has_classic_microfacets: bsdf.classic_microfacets,
             has_phong: bsdf.phong,
             has_specular_layer: bsdf.specular_layer,
             has_transmission: bsdf.transmission,
@@ -34,7 +35,7 @@ pub use surface_spec;
 
 /// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
 /// is off where nothing else is known.
-pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 25] = [
+pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 26] = [
     ("has_metal", METAL_LOBES, "no material is metal"),
     (
         "has_conductor",
@@ -66,6 +67,7 @@ pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 25] = [
         "dielectric reflection",
         "no material reflects specularly",
     ),
+    ("has_classic_microfacets", "classical microfacets", "no metal has them"),
     ("has_phong", "modified Phong lobes", "no material has one"),
     ("has_transmission", "transmission", "no material transmits"),
     ("has_multiple_scattering", COMPENSATION, "no material is metal"),

@@ -3,9 +3,9 @@
 use clerestory::scene::FresnelForm;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{
-    BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR,
-    BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf,
-    bsdf_sample,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_PHONG,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext,
+    BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf, bsdf_sample,
 };
 use clerestory::transport::fresnel::form::MetalFresnel;
 use clerestory_tests::random::Random;
@@ -56,12 +56,25 @@ fn the_scattering_function_agrees_with_its_twin() {
                 ]);
                 // Metals by colour, index, lobe, and by each form of their Fresnel factor.
                 let kind = r.below(3 + forms.len());
+                let classic = r.choose(&[
+                    0,
+                    0,
+                    BSDF_CLASSIC,
+                    BSDF_CLASSIC | BSDF_BECKMANN,
+                    BSDF_CLASSIC | BSDF_COSINE_LOBE | BSDF_SIMPLIFIED_G,
+                ]);
                 let (parameters, flags) = match kind.checked_sub(3) {
                     Some(form) => forms[form],
                     None => (exact, [0, BSDF_CONDUCTOR, BSDF_PHONG][kind]),
                 };
                 all.extend(parameters.iter().flat_map(|v| v.as_vec3().to_array()));
-                all.push(f32::from_bits(flags));
+                // Classical microfacets are those of whole metals.
+                if classic != 0 && flags != BSDF_PHONG {
+                    (all[3], all[5]) = (1.0, 0.0);
+                    all.push(f32::from_bits(flags | classic));
+                } else {
+                    all.push(f32::from_bits(flags));
+                }
                 let wo = Vec3::new(r.range(-0.9, 0.9), r.range(-0.4, 0.4), 0.0);
                 let wo = (wo + Vec3::Z * r.choose(&[1.0, -1.0]) * r.range(0.02, 1.0)).normalize();
                 let mut wi = r.direction();

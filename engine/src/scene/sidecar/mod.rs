@@ -17,6 +17,7 @@
 //! vase = { metal = "gold", fresnel = "compensated" }  # exact, schlick, rescaled, compensated, f82-tint, hoffman, simplified
 //! cup = { reflectance = [0.9, 0.7, 0.4], edge_tint = [0.8, 0.6, 0.5] }
 //! coin = { spectrum = "coin.csv" }                    # lines of a wavelength in nanometres, n, k
+//! pan = { metal = "copper", distribution = "beckmann", geometry = "cook-torrance" }  # ggx, beckmann, cosine-lobe; cook-torrance, simplified
 //!
 //! [phong]                       # by material name: the modified Phong model in place of metal and coat; no transmission
 //! floor = { exponent = 50.0, share = 0.4 }    # of the reflectance, the base colour; the rest is Lambert's
@@ -48,8 +49,8 @@ use serde::Deserialize;
 use medium::MediumTable;
 
 use super::{
-    Camera, ConductorIor, Environment, FresnelForm, Material, Note, Projection, Scene, builtin, files, metals,
-    phong_roughness,
+    Camera, ConductorIor, Distribution, Environment, FresnelForm, Geometry, Material, Microfacets, Note, Projection,
+    Scene, builtin, files, metals, phong_roughness,
 };
 use crate::catalogue::{Role, Row};
 use crate::input::InputFiles;
@@ -98,7 +99,8 @@ struct EnvironmentTable {
 #[serde(
     untagged,
     expecting = "a metal's name, or a table with metal, spectrum, eta and k, or reflectance and edge_tint, and if wanted fresnel: exact, \
-                 schlick, rescaled, compensated, f82-tint, hoffman or simplified"
+                 schlick, rescaled, compensated, f82-tint, hoffman or simplified; distribution: ggx, beckmann or cosine-lobe; geometry: \
+                 cook-torrance or simplified"
 )]
 enum Metal {
     Named(String),
@@ -115,6 +117,18 @@ struct MetalTable {
     reflectance: Option<[f32; 3]>,
     edge_tint: Option<[f32; 3]>,
     fresnel: Option<FresnelForm>,
+    distribution: Option<Distribution>,
+    geometry: Option<Geometry>,
+}
+
+impl MetalTable {
+    /// Classical microfacets where either part is named.
+    fn microfacets(&self) -> Option<Microfacets> {
+        (self.distribution.is_some() || self.geometry.is_some()).then(|| Microfacets {
+            distribution: self.distribution.unwrap_or_default(),
+            geometry: self.geometry.unwrap_or_default(),
+        })
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -303,16 +317,18 @@ impl Sidecar {
 
     fn metal(&self, scene: &mut Scene, named: &Named, name: &str, metal: &Metal, read: &InputFiles<'_>) -> Result<()> {
         let key = format!("metals.{name}");
-        let (conductor, fresnel) = match metal {
-            Metal::Named(metal) => (self.named_metal(&key, metal)?, FresnelForm::Exact),
+        let (conductor, fresnel, microfacets) = match metal {
+            Metal::Named(metal) => (self.named_metal(&key, metal)?, FresnelForm::Exact, None),
             Metal::Described(table) => (
                 self.described_metal(&key, table, read)?,
                 table.fresnel.unwrap_or_default(),
+                table.microfacets(),
             ),
         };
         self.change_materials(scene, named, [&key, name], |material| {
             material.conductor = Some(conductor);
             material.fresnel = fresnel;
+            material.microfacets = microfacets;
             material.metallic = 1.0;
         })
     }

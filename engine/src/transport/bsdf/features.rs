@@ -21,6 +21,8 @@ pub struct BsdfFeatures {
     pub tinted_conductor: bool,
     /// Some conductor has the simplified factor.
     pub simplified_conductor: bool,
+    /// Some metal has classical microfacets.
+    pub classic_microfacets: bool,
     /// Some metal is a modified Phong lobe.
     pub phong: bool,
     /// Some dielectric has `specular` > 0.
@@ -42,6 +44,7 @@ impl BsdfFeatures {
         compensated_conductor: true,
         tinted_conductor: true,
         simplified_conductor: true,
+        classic_microfacets: true,
         phong: true,
         specular_layer: true,
         transmission: true,
@@ -56,6 +59,7 @@ impl BsdfFeatures {
         compensated_conductor: false,
         tinted_conductor: false,
         simplified_conductor: false,
+        classic_microfacets: false,
         phong: false,
         specular_layer: false,
         transmission: false,
@@ -76,12 +80,13 @@ impl BsdfFeatures {
                 compensated_conductor: f.compensated_conductor || m.has_conductor(&[FresnelForm::Compensated]),
                 tinted_conductor: f.tinted_conductor || m.has_conductor(&[FresnelForm::F82Tint, FresnelForm::Hoffman]),
                 simplified_conductor: f.simplified_conductor || m.has_conductor(&[FresnelForm::Simplified]),
+                classic_microfacets: f.classic_microfacets || m.microfacets.is_some(),
                 phong: f.phong || (m.metallic > 0.0 && m.phong),
                 specular_layer: f.specular_layer
                     || (m.specular > 0.0 && m.metallic < 1.0)
                     || (m.specular > 0.0 && m.metallic_roughness_texture.is_some()),
                 transmission: f.transmission || m.transmission > 0.0,
-                multiple_scattering: f.multiple_scattering || (m.metallic > 0.0 && !m.phong),
+                multiple_scattering: f.multiple_scattering || (m.metallic > 0.0 && !m.phong && m.microfacets.is_none()),
                 separable_masking: false,
             })
     }

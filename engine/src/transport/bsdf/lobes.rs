@@ -5,15 +5,18 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::{
-    BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_IMPORTANCE, BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR,
-    BSDF_SIMPLIFIED_CONDUCTOR, BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
-    LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_IMPORTANCE,
+    BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf,
+    BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed,
+    mean3,
 };
 use crate::transport::albedo::{albedo_average, albedo_layer, albedo_lookup};
 use crate::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
 use crate::transport::fresnel::simplified::fresnel_simplified;
 use crate::transport::fresnel::tinted::fresnel_tinted;
 use crate::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_f0, fresnel_schlick};
+use crate::transport::ggx::{ggx_d, ggx_visible_pdf};
+use crate::transport::microfacets::{beckmann_d, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, kelemen_g};
 
 /// Reflectances of the two lobes that are sampled by the cosine: the diffuse base and the metal's multiple scattering.
 pub(super) struct CosineLobes {
@@ -39,6 +42,35 @@ impl BsdfContext<'_> {
     /// Whether its metal is a modified Phong lobe.
     pub(super) fn is_phong(&self, b: &Bsdf) -> bool {
         self.features.phong && b.flags & BSDF_PHONG != 0
+    }
+
+    /// Whether its metal has classical microfacets that are no mirror.
+    pub(super) fn is_classic(&self, b: &Bsdf) -> bool {
+        self.features.classic_microfacets && b.flags & BSDF_CLASSIC != 0 && !b.is_delta()
+    }
+
+    /// f |cos| of a classical metal, and the density of the directions that its normals reflect; both cosines positive.
+    pub(super) fn classic_eval(&self, b: &Bsdf, wo: DVec3, wi: DVec3) -> (DVec3, f64) {
+        let h = (wo + wi).normalize();
+        let cos_h = wo.dot(h);
+        if cos_h <= 0.0 || h.z <= 0.0 {
+            return (DVec3::ZERO, 0.0);
+        }
+        let (d, normals) = if b.flags & BSDF_BECKMANN != 0 {
+            let d = beckmann_d(h, b.alpha);
+            (d, d * h.z)
+        } else if b.flags & BSDF_COSINE_LOBE != 0 {
+            let d = cosine_lobe_d(h, cosine_lobe_exponent(b.alpha));
+            (d, d * h.z)
+        } else {
+            (ggx_d(h, b.alpha), ggx_visible_pdf(wo, h, b.alpha))
+        };
+        let g = if b.flags & BSDF_SIMPLIFIED_G != 0 {
+            kelemen_g(wi, h)
+        } else {
+            cook_torrance_g(wi, wo, h)
+        };
+        (self.metal_fresnel(b, cos_h) * (d * g * wi.z), normals / (4.0 * cos_h))
     }
 
     /// Reflectance of the dielectric layer; `eta` is that beyond over that on the side of ωo.
@@ -154,8 +186,11 @@ impl BsdfContext<'_> {
             diffuse = opaque * b.base_color * self.layer_loss(b, cos_o);
         }
         let mut metal = DVec3::ZERO;
-        let compensated =
-            self.features.metal && self.features.multiple_scattering && !b.is_delta() && !self.is_phong(b);
+        let compensated = self.features.metal
+            && self.features.multiple_scattering
+            && !b.is_delta()
+            && !self.is_phong(b)
+            && !self.is_classic(b);
         if compensated && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION) {
             let e_average = albedo_average(self.table, 0, b.alpha);
             let loss = 1.0 - e_average;

@@ -3,10 +3,11 @@
 use glam::DVec3;
 
 use super::{
-    BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR,
-    BSDF_THIN, BSDF_TINTED_CONDUCTOR, ETA_MATCHED,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_PHONG,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_THIN, BSDF_TINTED_CONDUCTOR,
+    ETA_MATCHED,
 };
-use crate::scene::{ConductorIor, FresnelForm, Material};
+use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets};
 use crate::transport::fresnel::form::MetalFresnel;
 use crate::transport::fresnel::fresnel_f0;
 use crate::transport::ggx::ALPHA_MIN;
@@ -47,6 +48,20 @@ pub(crate) fn conductor_flag(fresnel: &MetalFresnel) -> u32 {
         MetalFresnel::Tinted { .. } => BSDF_TINTED_CONDUCTOR,
         MetalFresnel::Simplified { .. } => BSDF_SIMPLIFIED_CONDUCTOR,
     }
+}
+
+/// The bits of [`Bsdf::flags`] for classical microfacets.
+pub(crate) fn classic_flags(microfacets: Microfacets) -> u32 {
+    let distribution = match microfacets.distribution {
+        Distribution::Ggx => 0,
+        Distribution::Beckmann => BSDF_BECKMANN,
+        Distribution::CosineLobe => BSDF_COSINE_LOBE,
+    };
+    let geometry = match microfacets.geometry {
+        Geometry::CookTorrance => 0,
+        Geometry::Simplified => BSDF_SIMPLIFIED_G,
+    };
+    BSDF_CLASSIC | distribution | geometry
 }
 
 /// The factors of a glTF material with its `KHR_materials_*` extensions.
@@ -111,7 +126,18 @@ impl Bsdf {
             thickness: m.thickness.into(),
         });
         let base = m.conductor.map_or(base, |c| base.with_conductor_form(&c, m.fresnel));
+        let base = m
+            .microfacets
+            .map_or(base, |microfacets| base.with_microfacets(microfacets));
         if m.phong { base.with_phong() } else { base }
+    }
+
+    /// The same with classical microfacets of its metal.
+    pub fn with_microfacets(self, microfacets: Microfacets) -> Self {
+        Self {
+            flags: self.flags | classic_flags(microfacets),
+            ..self
+        }
     }
 
     /// The same with a modified Phong lobe as its metal.

@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use super::*;
-use crate::scene::{ConductorIor, FresnelForm, Material, phong_roughness};
+use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets, phong_roughness};
 use crate::test_random::Random;
 use crate::transport::albedo::{AlbedoTable, albedo_average, albedo_lookup, integrate_albedos};
 use crate::transport::fresnel::form::MetalFresnel;
@@ -47,6 +47,25 @@ const WHITE: GltfFactors = GltfFactors {
 fn direction(cos_theta: f64, phi: f64) -> DVec3 {
     let r = (1.0 - cos_theta * cos_theta).sqrt();
     DVec3::new(r * phi.cos(), r * phi.sin(), cos_theta)
+}
+
+/// Every pairing of a distribution with a geometric term.
+fn classical() -> [(&'static str, Microfacets); 6] {
+    let of = |distribution, geometry| Microfacets { distribution, geometry };
+    [
+        ("GGX, Cook and Torrance", of(Distribution::Ggx, Geometry::CookTorrance)),
+        ("GGX, simplified", of(Distribution::Ggx, Geometry::Simplified)),
+        (
+            "Beckmann, Cook and Torrance",
+            of(Distribution::Beckmann, Geometry::CookTorrance),
+        ),
+        ("Beckmann, simplified", of(Distribution::Beckmann, Geometry::Simplified)),
+        (
+            "lobe, Cook and Torrance",
+            of(Distribution::CosineLobe, Geometry::CookTorrance),
+        ),
+        ("lobe, simplified", of(Distribution::CosineLobe, Geometry::Simplified)),
+    ]
 }
 
 /// One of each kind, smooth and rough.
@@ -104,6 +123,9 @@ fn zoo() -> Vec<(&'static str, Bsdf)> {
         }
         let compensated = bsdf_gltf(&metal).with_conductor_form(&gold, FresnelForm::Compensated);
         all.push(("compensated", compensated));
+        for (name, microfacets) in classical() {
+            all.push((name, bsdf_gltf(&metal).with_microfacets(microfacets)));
+        }
         all.push(("thin", bsdf_gltf(&clear)));
         all.push((
             "solid",
@@ -172,6 +194,51 @@ fn specular_zero_is_exactly_lambert() {
             let s = bsdf_sample(&c, &b, wo, u, LOBE_ALL);
             assert!((s.weight - b.base_color).abs().max_element() < 1e-15);
             assert_eq!(s.flags, LOBE_DIFFUSE & LOBE_REFLECTION);
+        }
+    }
+}
+
+/// White metals of classical microfacets: their product, and no more light than comes in.
+#[test]
+fn classical_metals_are_the_product_of_their_parts() {
+    use crate::transport::ggx::ggx_d;
+    use crate::transport::microfacets::{beckmann_d, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, kelemen_g};
+    for (name, microfacets) in classical() {
+        for alpha in [0.1f64, 0.4, 1.0] {
+            let material = Material {
+                roughness: alpha.sqrt() as f32,
+                microfacets: Some(microfacets),
+                ..Material::mirror("white", Vec3::ONE)
+            };
+            let b = Bsdf::from_material(&material);
+            let features = BsdfFeatures::of_materials([&material]);
+            assert!(features.classic_microfacets && !features.multiple_scattering);
+            let c = context(features);
+            for i in 0..300 {
+                let [wo, wi] = [41, 42].map(|seed| {
+                    let w = square_to_sphere(random3(i, seed).truncate());
+                    w.with_z(w.z.abs().max(1e-3)).normalize()
+                });
+                let h = (wo + wi).normalize();
+                let d = match microfacets.distribution {
+                    Distribution::Ggx => ggx_d(h, b.alpha),
+                    Distribution::Beckmann => beckmann_d(h, b.alpha),
+                    Distribution::CosineLobe => cosine_lobe_d(h, cosine_lobe_exponent(b.alpha)),
+                };
+                let g = match microfacets.geometry {
+                    Geometry::CookTorrance => cook_torrance_g(wi, wo, h),
+                    Geometry::Simplified => kelemen_g(wi, h),
+                };
+                let (f, _) = bsdf_eval_pdf(&c, &b, wo, wi, LOBE_ALL);
+                assert!((f.x - d * g * wi.z).abs() <= 1e-9 * f.x, "{name}: {f} {d} {g}");
+            }
+            for cos_o in [1.0, 0.5, 0.2, 0.05] {
+                let (leaves, error) = albedo(&c, &b, direction(cos_o, 0.3), LOBE_ALL, 8192);
+                assert!(
+                    leaves.x <= 1.0 + 4.0 * error + 1e-3,
+                    "{name}, {alpha}, {cos_o}: {leaves}"
+                );
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::gpu::shaders::constants::{
 };
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::scene::{AlphaMode, Material, Scene};
-use crate::transport::bsdf::conductor_flag;
+use crate::transport::bsdf::{classic_flags, conductor_flag};
 use crate::transport::fresnel::form::MetalFresnel;
 use glam::DVec3;
 
@@ -27,6 +27,7 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         .conductor
         .map(|c| MetalFresnel::new(m.fresnel, c.eta.as_dvec3(), c.k.as_dvec3()));
     let exact = matches!(fresnel, Some(MetalFresnel::Exact { .. }));
+    let microfacets = m.microfacets.map_or(0, classic_flags) << MATERIAL_FORM_SHIFT;
     let form = fresnel.as_ref().filter(|_| !exact).map_or(0, conductor_flag) << MATERIAL_FORM_SHIFT;
     let [conductor_eta, conductor_k, conductor_average] = fresnel
         .map_or([DVec3::ONE, DVec3::ZERO, DVec3::ZERO], |fresnel| fresnel.parameters())
@@ -65,6 +66,7 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
             | flag(m.unlit, MATERIAL_UNLIT)
             | flag(exact, MATERIAL_CONDUCTOR)
             | form
+            | microfacets
             | flag(m.phong, MATERIAL_PHONG)
             | flag(m.boundary, MATERIAL_BOUNDARY)
             | alpha_flag,
