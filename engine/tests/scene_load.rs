@@ -114,21 +114,95 @@ fn the_sidecar_of_the_reference_is_understood() {
         .and_then(|rest| rest.split("```").next());
     let folder = folder(block.expect("a TOML block"));
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("file");
-    let more = ["bowl", "floor", "bounds"];
+    let more = ["bowl", "vase", "cup", "coin", "pan", "floor", "bounds"];
     let faces = more.map(|name| format!("usemtl {name}\nf 1 3 2\n")).concat();
     let materials = more.map(|name| format!("newmtl {name}\nKd 0.5 0.5 0.5\n")).concat();
     write("m.obj", &format!("{OBJ}{faces}"));
     write("m.mtl", &format!("{MTL}{materials}"));
+    write("coin.csv", "380 1.2 3.0\n780 0.9 4.0\n");
     exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, |_, _| (1.0, 1.0, 1.0)).expect("EXR");
     let scene = load(folder.path(), "m.obj").expect("scene");
     assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
-    assert!(scene.materials[2].phong && scene.materials[2].metallic == 0.4);
+    assert!(scene.materials[2..5].iter().all(|metal| metal.conductor.is_some()));
+    assert_eq!(scene.materials[2].fresnel, scene::FresnelForm::Compensated);
+    assert!(scene.materials[5].microfacets.is_some() && scene.materials[2].microfacets.is_none());
+    assert!(scene.materials[6].phong && scene.materials[6].metallic == 0.4);
     assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
     assert_eq!(scene.defaults.aspect, Some(1.5));
     assert!(scene.notes.is_empty(), "{:?}", scene.notes);
     let media = SceneProfile::of(&scene).media;
     assert!(media.surrounding && media.boundaries && media.heterogeneous && media.count == 2);
-    assert!(scene.materials[3].interior == Some(1) && scene.media[1].density.is_some());
+    assert!(scene.materials[7].interior == Some(1) && scene.media[1].density.is_some());
+}
+
+#[test]
+fn metals_are_named_measured_or_coloured_and_name_their_form() {
+    use clerestory::scene::{Distribution, FresnelForm, Geometry, Microfacets};
+    let load_metal = |text: &str| {
+        let folder = folder(&format!("[metals]\nring = {text}\n"));
+        std::fs::write(folder.path().join("n k.csv"), "380, 0.5, 2.0\n780, 0.5, 2.0\n").expect("file");
+        load(folder.path(), "m.obj").expect(text)
+    };
+    let gold = scene::metals::by_name("gold");
+    for form in FresnelForm::ALL {
+        let scene = load_metal(&format!("{{ metal = \"gold\", fresnel = \"{form}\" }}"));
+        let ring = &scene.materials[0];
+        assert_eq!((ring.conductor, ring.fresnel, ring.metallic), (gold, form, 1.0));
+        let profile = SceneProfile::of(&scene);
+        assert!(profile.has_conductor && profile.has_fitted_conductor == (form != FresnelForm::Exact));
+    }
+    assert_eq!(load_metal("\"gold\"").materials[0].fresnel, FresnelForm::Exact);
+    let spectrum = load_metal("{ spectrum = \"n k.csv\" }").materials[0]
+        .conductor
+        .expect("conductor");
+    assert!((spectrum.eta - 0.5).abs().max_element() < 1e-6 && (spectrum.k - 2.0).abs().max_element() < 1e-6);
+    let colors =
+        load_metal("{ reflectance = [0.9, 0.5, 0.04], edge_tint = [1.0, 0.5, 0.0], fresnel = \"simplified\" }");
+    let colors = colors.materials[0].conductor.expect("conductor");
+    assert!(
+        (colors.eta.x - 0.1 / 1.9).abs() < 1e-6 && colors.eta.z > 1.49 && colors.k.z < 1e-3,
+        "{colors:?}"
+    );
+    for (text, words) in [
+        ("{ metal = \"mithril\" }", "gold"),
+        ("{ metal = \"gold\", fresnel = \"quick\" }", "f82-tint"),
+        ("{ metal = \"gold\", eta = [1, 1, 1] }", "needs one of"),
+        ("{ eta = [1, 1, 1] }", "needs one of"),
+        ("{ fresnel = \"rescaled\" }", "needs one of"),
+        ("{ eta = [0, 1, 1], k = [1, 1, 1] }", "eta above 0"),
+        ("{ eta = [1, 1, 1], k = [1, nan, 1] }", "k at least 0"),
+        ("{ reflectance = [1, 1, 2], edge_tint = [0, 0, 0] }", "from 0 to 1"),
+        ("{ spectrum = \"nowhere.csv\" }", "metals.ring.spectrum"),
+        ("{ spectrum = \"m.obj\" }", "line 1"),
+    ] {
+        let message = refusal(&format!("[metals]\nring = {text}\n"));
+        assert!(message.contains(words), "{text}: {message}");
+    }
+    let beckmann = load_metal("{ metal = \"gold\", distribution = \"beckmann\" }");
+    let microfacets = beckmann.materials[0].microfacets.expect("microfacets");
+    assert_eq!(
+        (microfacets.distribution, microfacets.geometry),
+        (Distribution::Beckmann, Geometry::CookTorrance)
+    );
+    assert!(SceneProfile::of(&beckmann).has_classic_microfacets);
+    let simplified = load_metal("{ metal = \"gold\", geometry = \"simplified\" }").materials[0].microfacets;
+    assert_eq!(
+        simplified,
+        Some(Microfacets {
+            distribution: Distribution::Ggx,
+            geometry: Geometry::Simplified,
+        })
+    );
+    let mut partial = beckmann;
+    partial.materials[0].metallic = 0.5;
+    let message = partial.check().expect_err("half a metal").to_string();
+    assert!(message.contains("microfacets"), "{message}");
+    // A form needs an index.
+    let mut scene = load_metal("\"gold\"");
+    scene.materials[0].conductor = None;
+    scene.materials[0].fresnel = FresnelForm::Compensated;
+    let message = scene.check().expect_err("no conductor").to_string();
+    assert!(message.contains("compensated needs a conductor"), "{message}");
 }
 
 #[test]

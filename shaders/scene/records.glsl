@@ -12,6 +12,8 @@ const uint MATERIAL_MASK = 8u;
 const uint MATERIAL_BLEND = 16u;
 const uint MATERIAL_BOUNDARY = 32u;  // not there but for the medium that it bounds
 const uint MATERIAL_PHONG = 64u;     // its metal is a modified Phong lobe
+// BSDF_SCHLICK_CONDUCTOR and its like, shifted by this: what the conductor's three vectors hold; and BSDF_CLASSIC_FLAGS.
+const uint MATERIAL_FORM_SHIFT = 8u;
 
 const uint LIGHT_TRIANGLE = 0u;
 const uint LIGHT_POINT = 1u;

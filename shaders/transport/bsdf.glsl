@@ -5,13 +5,14 @@
 //   f_diffuse       base colour (1 - E(wo)) (1 - E(wi)) / (pi (1 - E_avg)), E the albedo of f_layer: reciprocal, and a white base
 //                   gives back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997)
 //   f_transmission  Walter et al. (2007) through solids, with radiance scaled by 1/eta^2; mirrored GGX lobe through thin walls
-//   f_metal         GGX with Schlick's or the exact conductor's Fresnel factor, plus the lobe of Kulla and Conty (2017); or base colour times the
-//                  modified Phong lobe, for surfaces without layer and transmission
+//   f_metal         GGX with Schlick's or a conductor's Fresnel factor, exact or in the form that it names, plus the lobe of Kulla and Conty (2017); or base colour times the
+//                  modified Phong lobe, for surfaces without layer and transmission; or classical microfacets (transport/microfacets.glsl)
 // Guarantees: never gains energy beyond the interpolation error of the albedo table (stated in bsdf.rs's tests); reflection is
 // reciprocal, transmission up to eta^2; specular 0 without transmission and metal is exactly Lambert. From inside a solid
 // (wo.z < 0) the diffuse base is black: what glTF calls its opaque part absorbs.
 // Frame: z is the shading normal; of a solid it points out of the body. Opaque and thin surfaces scatter alike on both sides.
-// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_PHONG, HAS_SPECULAR_LAYER,
+// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_SCHLICK_CONDUCTOR, HAS_COMPENSATED_CONDUCTOR,
+// HAS_TINTED_CONDUCTOR, HAS_SIMPLIFIED_CONDUCTOR, HAS_CLASSIC_MICROFACETS, HAS_PHONG, HAS_SPECULAR_LAYER,
 // HAS_TRANSMISSION, HAS_MULTIPLE_SCATTERING, SEPARABLE_MASKING; `float albedo_table(uint)`, read only if HAS_SPECULAR_LAYER or
 // HAS_MULTIPLE_SCATTERING.
 #ifndef CLERESTORY_TRANSPORT_BSDF_GLSL
@@ -20,7 +21,9 @@
 #include "transport/albedo.glsl"
 #include "transport/choice.glsl"
 #include "transport/fresnel.glsl"
+#include "transport/fresnel_forms.glsl"
 #include "transport/ggx.glsl"
+#include "transport/microfacets.glsl"
 #include "transport/phong.glsl"
 #include "transport/warp.glsl"
 
@@ -37,6 +40,18 @@ const uint BSDF_THIN = 1u;        // transmission goes straight through a thin w
 const uint BSDF_CONDUCTOR = 2u;   // the metal is conductor_eta + i conductor_k, not base_color
 const uint BSDF_IMPORTANCE = 4u;  // wo is where particles come from: no 1/eta^2
 const uint BSDF_PHONG = 8u;       // the metal is a modified Phong lobe of reflectance base_color
+// The metal is a conductor in another form than the exact one: what stands in conductor_eta and conductor_k.
+const uint BSDF_SCHLICK_CONDUCTOR = 16u;      // F0
+const uint BSDF_COMPENSATED_CONDUCTOR = 32u;  // F0 and a, with the exponents in conductor_average
+const uint BSDF_TINTED_CONDUCTOR = 64u;       // F0 and b
+const uint BSDF_SIMPLIFIED_CONDUCTOR = 128u;  // eta and k
+// The metal's microfacets are not GGX's with Smith's masking, and are not compensated for multiple scattering: GGX's, Beckmann's or a cosine lobe, with the
+// geometric term of Cook and Torrance or the simplified one.
+const uint BSDF_CLASSIC = 256u;
+const uint BSDF_BECKMANN = 512u;
+const uint BSDF_COSINE_LOBE = 1024u;
+const uint BSDF_SIMPLIFIED_G = 2048u;
+const uint BSDF_CLASSIC_FLAGS = BSDF_CLASSIC | BSDF_BECKMANN | BSDF_COSINE_LOBE | BSDF_SIMPLIFIED_G;
 
 // A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
 const float ETA_MATCHED = 1.001;
@@ -52,7 +67,7 @@ struct Bsdf {
     float alpha;           // GGX width, which stands for a Phong exponent too; a mirror below ALPHA_MIN
     vec3 conductor_k;
     float transmission;
-    vec3 conductor_average;  // fresnel_conductor_average of the two above
+    vec3 conductor_average;  // cosine-weighted average of the conductor's factor
     float eta;             // index inside / outside; 0 stands for Schlick's factor
     uint flags;
 };
@@ -69,6 +84,7 @@ float mean3(vec3 v) { return (v.x + v.y + v.z) * (1.0 / 3.0); }
 bool lobe_allowed(uint mask, uint lobe) { return (mask & lobe) != 0u; }
 bool bsdf_is_delta(Bsdf b) { return b.alpha < ALPHA_MIN; }
 bool bsdf_is_phong(Bsdf b) { return HAS_PHONG && (b.flags & BSDF_PHONG) != 0u; }
+bool bsdf_is_classic(Bsdf b) { return HAS_CLASSIC_MICROFACETS && (b.flags & BSDF_CLASSIC) != 0u && !bsdf_is_delta(b); }
 float bsdf_metallic(Bsdf b) { return HAS_METAL ? b.metallic : 0.0; }
 float bsdf_transmission(Bsdf b) { return HAS_TRANSMISSION ? b.transmission : 0.0; }
 
@@ -118,7 +134,66 @@ vec3 metal_fresnel(Bsdf b, float cos_h) {
     if (HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u) {
         return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
     }
+    if (HAS_SCHLICK_CONDUCTOR && (b.flags & BSDF_SCHLICK_CONDUCTOR) != 0u) {
+        return fresnel_schlick(cos_h, b.conductor_eta);
+    }
+    if (HAS_COMPENSATED_CONDUCTOR && (b.flags & BSDF_COMPENSATED_CONDUCTOR) != 0u) {
+        return fresnel_compensated(cos_h, b.conductor_eta, b.conductor_k, b.conductor_average);
+    }
+    if (HAS_TINTED_CONDUCTOR && (b.flags & BSDF_TINTED_CONDUCTOR) != 0u) {
+        return fresnel_tinted(cos_h, b.conductor_eta, b.conductor_k);
+    }
+    if (HAS_SIMPLIFIED_CONDUCTOR && (b.flags & BSDF_SIMPLIFIED_CONDUCTOR) != 0u) {
+        return fresnel_simplified(cos_h, b.conductor_eta, b.conductor_k);
+    }
     return fresnel_schlick(cos_h, b.base_color);
+}
+
+float classic_d(Bsdf b, vec3 h) {
+    if ((b.flags & BSDF_BECKMANN) != 0u) {
+        return beckmann_d(h, b.alpha);
+    }
+    return (b.flags & BSDF_COSINE_LOBE) != 0u ? cosine_lobe_d(h, cosine_lobe_exponent(b.alpha)) : ggx_d(h, b.alpha);
+}
+
+// Normals of GGX are those that are visible, others those by their density times their cosine.
+vec3 classic_sample(Bsdf b, vec3 wo, vec2 u) {
+    if ((b.flags & BSDF_BECKMANN) != 0u) {
+        return beckmann_sample(b.alpha, u);
+    }
+    return (b.flags & BSDF_COSINE_LOBE) != 0u ? cosine_lobe_sample(cosine_lobe_exponent(b.alpha), u)
+                                              : ggx_sample_visible(wo, b.alpha, u);
+}
+
+// f cos (rgb) of a classic metal, and the density of the directions that its normals reflect (a); wo.z and wi.z > 0.
+vec4 classic_eval(Bsdf b, vec3 wo, vec3 wi) {
+    vec3 h = normalize(wo + wi);
+    float cos_h = dot(wo, h);
+    if (cos_h <= 0.0 || h.z <= 0.0) {
+        return vec4(0.0);
+    }
+    float d = classic_d(b, h);
+    bool by_cosine = (b.flags & (BSDF_BECKMANN | BSDF_COSINE_LOBE)) != 0u;
+    float normals = by_cosine ? d * h.z : ggx_visible_pdf(wo, h, b.alpha);
+    float g = (b.flags & BSDF_SIMPLIFIED_G) != 0u ? kelemen_g(wi, h) : cook_torrance_g(wi, wo, h);
+    return vec4(metal_fresnel(b, cos_h) * (d * g * wi.z), normals / (4.0 * cos_h));
+}
+
+// The flags of the conductors that are compiled in.
+uint conductor_flags() {
+    return (HAS_CONDUCTOR ? BSDF_CONDUCTOR : 0u) | (HAS_SCHLICK_CONDUCTOR ? BSDF_SCHLICK_CONDUCTOR : 0u)
+        | (HAS_COMPENSATED_CONDUCTOR ? BSDF_COMPENSATED_CONDUCTOR : 0u) | (HAS_TINTED_CONDUCTOR ? BSDF_TINTED_CONDUCTOR : 0u)
+        | (HAS_SIMPLIFIED_CONDUCTOR ? BSDF_SIMPLIFIED_CONDUCTOR : 0u);
+}
+
+// Whether the metal is a conductor by its index, in any form, not of a base colour.
+bool bsdf_is_conductor(Bsdf b) { return (b.flags & conductor_flags()) != 0u; }
+
+// Cosine-weighted hemispherical average of a conductor's factor.
+vec3 conductor_average(Bsdf b) {
+    return HAS_COMPENSATED_CONDUCTOR && (b.flags & BSDF_COMPENSATED_CONDUCTOR) != 0u
+        ? fresnel_compensated_average(b.conductor_eta, b.conductor_k, b.conductor_average)
+        : b.conductor_average;
 }
 
 // What the layer reflects of a microfacet (r) and what goes through it (t), as the mask allows.
@@ -183,13 +258,12 @@ CosineLobes cosine_lobes(Bsdf b, float cos_o, bool inside, uint mask) {
         lobes.diffuse = opaque * b.base_color * layer_loss(b, cos_o);
     }
     lobes.seen = lobes.diffuse;
-    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && !bsdf_is_delta(b) && !bsdf_is_phong(b) && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION)) {
+    if (HAS_METAL && HAS_MULTIPLE_SCATTERING && !bsdf_is_delta(b) && !bsdf_is_phong(b) && !bsdf_is_classic(b) && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION)) {
         float e_average = albedo_average(0u, b.alpha);
         float loss = 1.0 - e_average;
         if (loss > LOSS_MIN) {
-            bool exact = HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u;
             // 1/21 = 2 int (1 - mu)^5 mu dmu
-            vec3 f = exact ? b.conductor_average : mix(b.base_color, vec3(1.0), 1.0 / 21.0);
+            vec3 f = bsdf_is_conductor(b) ? conductor_average(b) : mix(b.base_color, vec3(1.0), 1.0 / 21.0);
             lobes.metal = m * f * f * e_average / (1.0 - f * loss) * (1.0 - albedo_lookup(0u, cos_o, b.alpha));
             lobes.seen += lobes.metal;
         }
@@ -238,6 +312,14 @@ vec4 bsdf_eval_upper(Bsdf b, CosineLobes lobes, float p_cosine, vec3 wo, vec3 wi
             float exponent = phong_exponent(b.alpha);
             float m = lobe_allowed(part, LOBE_GLOSSY & LOBE_REFLECTION) ? bsdf_metallic(b) : 0.0;
             result += vec4(phong_eval(m * b.base_color, exponent, wo, wi), (1.0 - p_cosine) * phong_pdf(exponent, wo, wi));
+        }
+        return result;
+    }
+    if (bsdf_is_classic(b)) {
+        if (reflected) {
+            vec4 classic = classic_eval(b, wo, wi);
+            float m = lobe_allowed(part, LOBE_GLOSSY & LOBE_REFLECTION) ? bsdf_metallic(b) : 0.0;
+            result += vec4(m * classic.rgb, (1.0 - p_cosine) * classic.a);
         }
         return result;
     }
@@ -315,6 +397,10 @@ BsdfSample bsdf_sample(Bsdf b, vec3 wo, vec3 u, uint mask) {
         flags = LOBE_DIFFUSE & LOBE_REFLECTION;
     } else if (bsdf_is_phong(b) && !bsdf_is_delta(b)) {
         wi = phong_sample(phong_exponent(b.alpha), wo, u.xy);
+        flags = LOBE_GLOSSY & LOBE_REFLECTION;
+    } else if (bsdf_is_classic(b)) {
+        vec3 h = classic_sample(b, wo, u.xy);
+        wi = 2.0 * dot(wo, h) * h - wo;
         flags = LOBE_GLOSSY & LOBE_REFLECTION;
     } else {
         bool delta = bsdf_is_delta(b);

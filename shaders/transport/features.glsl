@@ -24,6 +24,12 @@ layout(constant_id = 24) const bool HAS_PATH_AUTOMATON = false;        // the pa
 layout(constant_id = 25) const bool HAS_LOBE_LABELS = false;           // and tells lobes apart that share directions
 
 layout(constant_id = 26) const bool HAS_PHONG = true;                  // modified Phong lobes
+// Conductors whose Fresnel factor is in another form than the exact one.
+layout(constant_id = 30) const bool HAS_SCHLICK_CONDUCTOR = true;      // Schlick's, and rescaled
+layout(constant_id = 31) const bool HAS_COMPENSATED_CONDUCTOR = true;  // with a term of two coefficients
+layout(constant_id = 32) const bool HAS_TINTED_CONDUCTOR = true;       // with a term of one
+layout(constant_id = 33) const bool HAS_SIMPLIFIED_CONDUCTOR = true;   // without the sine
+layout(constant_id = 34) const bool HAS_CLASSIC_MICROFACETS = true;    // metals with others than GGX under Smith's masking
 
 layout(constant_id = 23) const bool HAS_LIGHT_TREE = false;            // lights are chosen by a tree, for the point that they are to light
 

@@ -26,6 +26,9 @@ float fresnel_dielectric(float cos_i, float eta) {
     return min(1.0, 0.5 * a * a * (1.0 + b * b));
 }
 
+// What keeps the one case of 0/0 defined: no interface (eta = 1, k = 0) at a cosine of 0, which reflects nothing.
+const float LEAST_SUM = 1e-30;
+
 // Exact conductor against vacuum, per band; complex index eta + i k.
 vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     float c2 = cos_i * cos_i;
@@ -37,7 +40,7 @@ vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     vec3 a = sqrt(mix(2.0 * ek * ek / (a2b2 - d), 0.5 * (a2b2 + d), greaterThanEqual(d, vec3(0.0))));
     vec3 sum = a2b2 + c2;
     vec3 cross_s = 2.0 * cos_i * a;
-    vec3 rs = (sum - cross_s) / (sum + cross_s);
+    vec3 rs = (sum - cross_s) / (sum + cross_s + LEAST_SUM);
     vec3 sum_p = c2 * a2b2 + s2 * s2;
     vec3 cross_p = cross_s * s2;
     vec3 rp = rs * (sum_p - cross_p) / (sum_p + cross_p);

@@ -104,6 +104,17 @@ Bsdf surface_bsdf(SceneMaterial m, Surface s) {
         b.conductor_average = m.conductor_average;
         b.flags |= BSDF_CONDUCTOR;
     }
+    // The forms' flags of materials are those of scattering functions, shifted.
+    uint form = (m.flags >> MATERIAL_FORM_SHIFT) & conductor_flags() & ~BSDF_CONDUCTOR;
+    if ((HAS_SCHLICK_CONDUCTOR || HAS_COMPENSATED_CONDUCTOR || HAS_TINTED_CONDUCTOR || HAS_SIMPLIFIED_CONDUCTOR) && form != 0u) {
+        b.conductor_eta = m.conductor_eta;
+        b.conductor_k = m.conductor_k;
+        b.conductor_average = m.conductor_average;
+        b.flags |= form;
+    }
+    if (HAS_CLASSIC_MICROFACETS) {
+        b.flags |= (m.flags >> MATERIAL_FORM_SHIFT) & BSDF_CLASSIC_FLAGS;
+    }
     if (HAS_PHONG && (m.flags & MATERIAL_PHONG) != 0u) {
         b.flags |= BSDF_PHONG;
     }

@@ -7,6 +7,11 @@
 
 const bool HAS_METAL = true;
 const bool HAS_CONDUCTOR = true;
+const bool HAS_SCHLICK_CONDUCTOR = true;
+const bool HAS_COMPENSATED_CONDUCTOR = true;
+const bool HAS_TINTED_CONDUCTOR = true;
+const bool HAS_SIMPLIFIED_CONDUCTOR = true;
+const bool HAS_CLASSIC_MICROFACETS = true;
 const bool HAS_PHONG = true;
 const bool HAS_SPECULAR_LAYER = true;
 const bool HAS_TRANSMISSION = true;

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 
 use clerestory::gpu::{Category, Gpu, PipelineInfo};
 use clerestory::scene::{
-    AlphaMode, Camera, Environment, Filter, Image, LightKind, Material, Mesh, Scene, Texture, Wrap,
+    AlphaMode, Camera, Environment, Filter, FresnelForm, Image, LightKind, Material, Mesh, Microfacets, Scene, Texture,
+    Wrap, metals,
 };
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::environment::EnvironmentTables;
@@ -88,6 +89,15 @@ fn features_are_those_of_the_scene() {
         glossy.materials[0].specular = 1.0;
         let mut phong = bare();
         phong.materials[0] = Material::phong("phong", Vec3::splat(0.5), 0.5, 20.0);
+        let metal_of = |fresnel| {
+            let mut scene = bare();
+            scene.materials[0] = Material {
+                conductor: metals::by_name("gold"),
+                fresnel,
+                ..Material::mirror("metal", Vec3::ONE)
+            };
+            scene
+        };
         let mut lamp = bare();
         lamp.materials[0].emission = Vec3::ONE;
         let mut sun = bare();
@@ -116,6 +126,40 @@ fn features_are_those_of_the_scene() {
             ("glass", glass, &["has_specular_layer", "has_transmission"]),
             ("glossy", glossy, &["has_specular_layer"]),
             ("phong", phong, &["has_metal", "has_phong"]),
+            (
+                "exact",
+                metal_of(FresnelForm::Exact),
+                &["has_metal", "has_conductor", "has_multiple_scattering"],
+            ),
+            (
+                "rescaled",
+                metal_of(FresnelForm::Rescaled),
+                &["has_metal", "has_multiple_scattering", "has_schlick_conductor"],
+            ),
+            (
+                "compensated",
+                metal_of(FresnelForm::Compensated),
+                &["has_metal", "has_multiple_scattering", "has_compensated_conductor"],
+            ),
+            (
+                "F82-tint",
+                metal_of(FresnelForm::F82Tint),
+                &["has_metal", "has_multiple_scattering", "has_tinted_conductor"],
+            ),
+            (
+                "simplified",
+                metal_of(FresnelForm::Simplified),
+                &["has_metal", "has_multiple_scattering", "has_simplified_conductor"],
+            ),
+            (
+                "classical",
+                {
+                    let mut scene = metal_of(FresnelForm::Exact);
+                    scene.materials[0].microfacets = Some(Microfacets::default());
+                    scene
+                },
+                &["has_metal", "has_conductor", "has_classic_microfacets"],
+            ),
             ("lamp", lamp, &["has_area_lights"]),
             ("sun", sun, &["has_punctual_lights"]),
             ("sky", sky, &["has_environment"]),
@@ -267,6 +311,20 @@ fn with_everything(mut scene: Scene) -> Scene {
     };
     point_triangle(&mut scene, everything, place);
     point_triangle(&mut scene, Material::phong("phong", Vec3::splat(0.5), 0.5, 20.0), place);
+    let classic = Material {
+        conductor: metals::by_name("copper"),
+        microfacets: Some(Microfacets::default()),
+        ..Material::default()
+    };
+    point_triangle(&mut scene, classic, place);
+    for fresnel in FresnelForm::ALL {
+        let metal = Material {
+            conductor: metals::by_name("copper"),
+            fresnel,
+            ..Material::default()
+        };
+        point_triangle(&mut scene, metal, place);
+    }
     point_triangle(
         &mut scene,
         Material {
@@ -302,6 +360,11 @@ fn features_that_are_compiled_in_without_need_change_no_bit() {
             for feature in [
                 "has_metal",
                 "has_conductor",
+                "has_schlick_conductor",
+                "has_compensated_conductor",
+                "has_tinted_conductor",
+                "has_simplified_conductor",
+                "has_classic_microfacets",
                 "has_phong",
                 "has_specular_layer",
                 "has_transmission",

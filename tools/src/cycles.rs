@@ -13,7 +13,7 @@ pub mod scenes;
 use std::path::Path;
 
 use clerestory::atomic;
-use clerestory::scene::{Camera, Environment, LightKind, Material, Projection, Scene};
+use clerestory::scene::{Camera, Environment, FresnelForm, LightKind, Material, Projection, Scene};
 use clerestory::{Error, Result};
 use glam::{DMat4, Vec3};
 use serde::Serialize;
@@ -89,6 +89,13 @@ impl Surface {
         if material.metallic == 1.0 {
             let color = base_color(material)?;
             return Ok(match material.conductor {
+                Some(_) if material.fresnel != FresnelForm::Exact => {
+                    return Err(format!(
+                        "a metal by the form {} of its Fresnel factor has no counterpart",
+                        material.fresnel
+                    ));
+                }
+                _ if material.microfacets.is_some() => return Err("classical microfacets are not exported".into()),
                 Some(conductor) => Self::Conductor {
                     eta: conductor.eta,
                     k: conductor.k,

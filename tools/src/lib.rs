@@ -8,6 +8,7 @@ pub mod geometry;
 mod json_file;
 pub mod least_squares;
 pub mod machine;
+pub mod metal_forms;
 pub mod mitsuba;
 pub mod page;
 mod python;

@@ -3,7 +3,7 @@
 //! Readers and generators end with it, and a host that builds a [`Scene`] itself should too: what passes cannot make an upload or a
 //! traversal read outside its buffers.
 
-use super::{Camera, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
+use super::{Camera, FresnelForm, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
 use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place: hits name each by a number of 32 bits, the last of which names none. What a device
@@ -226,6 +226,21 @@ fn check_material(material: &Material, images: usize) -> Result<(), Fault> {
         color("conductor.k", conductor.k)?;
         if conductor.eta.min_element() <= 0.0 {
             return Err(("conductor.eta".into(), "must be above 0".into()));
+        }
+    } else if material.fresnel != FresnelForm::Exact {
+        return Err(("fresnel".into(), format!("{} needs a conductor", material.fresnel)));
+    }
+    if material.microfacets.is_some() {
+        let sound = material.metallic == 1.0
+            && material.metallic_roughness_texture.is_none()
+            && material.transmission == 0.0
+            && !material.phong;
+        if !sound {
+            return Err((
+                "microfacets".into(),
+                "are those of a metal: metallic 1 without a texture of it, no transmission, no modified Phong model"
+                    .into(),
+            ));
         }
     }
     if material.phong {

@@ -10,6 +10,7 @@ mod files;
 pub mod gltf;
 pub mod medium;
 pub mod metals;
+mod microfacets;
 mod mtl;
 pub mod normal_map;
 mod obj;
@@ -23,6 +24,8 @@ pub mod texture;
 pub use files::{LoadOptions, Loaded, load, load_with};
 pub(crate) use medium::mean_density;
 pub use medium::{DensityGrid, MajorantGrid, Medium, Phase};
+pub use metals::FresnelForm;
+pub use microfacets::{Distribution, Geometry, Microfacets};
 pub use profile::{AlphaUse, EnvironmentUse, LightCounts, MediaUse, PhaseUse, SceneProfile, TransmissionUse};
 
 use glam::{DAffine3, Vec2, Vec3, Vec4};
@@ -265,6 +268,11 @@ pub struct Material {
     pub boundary: bool,
     /// Exact conductor that replaces the metallic lobe's Schlick Fresnel (sidecar only).
     pub conductor: Option<ConductorIor>,
+    /// How the conductor's reflectance follows from its index (sidecar only); without a conductor it must be [`FresnelForm::Exact`].
+    pub fresnel: FresnelForm,
+    /// Classical microfacets in place of GGX under Smith's masking (sidecar only), for a metal alone: metallic must be 1, without a texture of it and without
+    /// transmission and the modified Phong model.
+    pub microfacets: Option<Microfacets>,
     /// The metal is a modified Phong lobe of reflectance `base_color` (sidecar only): base colour · (metallic · Phong + (1 − metallic) ·
     /// Lambert). Its exponent is (1/α² − 1)/2 with α = roughness², that of a lobe about as wide as GGX's of this α. Only without
     /// transmission, conductor and specular layer: each of them is an error.
@@ -314,6 +322,8 @@ impl Default for Material {
             interior: None,
             boundary: false,
             conductor: None,
+            fresnel: FresnelForm::Exact,
+            microfacets: None,
             phong: false,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
@@ -323,6 +333,11 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Whether its metal is, at least in part, a conductor whose Fresnel factor has one of these forms.
+    pub fn has_conductor(&self, forms: &[FresnelForm]) -> bool {
+        self.metallic > 0.0 && self.conductor.is_some() && forms.contains(&self.fresnel)
+    }
+
     /// Smooth, clear glass of a solid body; it needs a closed mesh. Its thickness only marks it as solid.
     pub fn glass(name: impl Into<String>, ior: f32) -> Self {
         Self {

@@ -7,7 +7,7 @@ use std::fmt;
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{AlphaMode, Image, LightKind, Material, Medium, Phase, Scene, Texture};
+use super::{AlphaMode, FresnelForm, Image, LightKind, Material, Medium, Phase, Scene, Texture};
 use crate::catalogue::{Role, Row, sources};
 
 /// How alpha is used by the materials that are placed.
@@ -140,8 +140,12 @@ pub struct SceneProfile {
     pub environment: EnvironmentUse,
     /// Some placed material is, at least in part, metal.
     pub has_metal: bool,
-    /// Some metal has an exact complex index of refraction.
+    /// Some metal has a complex index of refraction.
     pub has_conductor: bool,
+    /// Some metal's Fresnel factor has another form than the exact one.
+    pub has_fitted_conductor: bool,
+    /// Some metal has classical microfacets.
+    pub has_classic_microfacets: bool,
     /// Some metal is a modified Phong lobe.
     pub has_phong: bool,
     /// Some non-metal reflects specularly.
@@ -226,6 +230,8 @@ impl SceneProfile {
             environment: environment_use(scene),
             has_metal: false,
             has_conductor: false,
+            has_fitted_conductor: false,
+            has_classic_microfacets: false,
             has_phong: false,
             has_rough_dielectric_spec: false,
             transmission: TransmissionUse {
@@ -319,7 +325,10 @@ impl SceneProfile {
         let transmits = dielectric && material.transmission > 0.0;
         self.has_normal_maps |= material.normal_texture.is_some();
         self.has_metal |= metallic[1] > 0.0;
-        self.has_conductor |= metallic[1] > 0.0 && material.conductor.is_some();
+        let conductor = metallic[1] > 0.0 && material.conductor.is_some();
+        self.has_conductor |= conductor;
+        self.has_fitted_conductor |= conductor && material.fresnel != FresnelForm::Exact;
+        self.has_classic_microfacets |= material.microfacets.is_some();
         self.has_phong |= metallic[1] > 0.0 && material.phong;
         self.has_rough_dielectric_spec |= reflects;
         if transmits {
@@ -436,6 +445,8 @@ impl fmt::Display for SceneProfile {
             ("shading normals", self.has_shading_normals),
             ("metal", self.has_metal),
             ("measured metal", self.has_conductor),
+            ("metal by a form of its Fresnel factor", self.has_fitted_conductor),
+            ("classical microfacets", self.has_classic_microfacets),
             ("modified Phong", self.has_phong),
             ("dielectric reflection", self.has_rough_dielectric_spec),
             ("solid transmission", self.transmission.solid),

@@ -3,10 +3,24 @@
 //! Sources: dielectric and conductor forms from Fresnel's equations (Born and Wolf, Principles of Optics, 1.5 and 14.2); Schlick,
 //! "An Inexpensive BRDF Model for Physically-based Rendering" (1994). Guarantees: results lie in [0, 1]; total internal reflection
 //! gives exactly 1; equal indices give exactly 0 off grazing. Twin of `transport/fresnel.glsl`.
+//!
+//! Cheaper forms of the conductor's factor stand in the modules below, each with its error beside the exact one; [`form`] chooses among them.
+
+pub mod compensated;
+pub mod curve;
+pub mod extinction;
+pub mod form;
+#[cfg(test)]
+mod published;
+pub mod rescaled;
+pub mod simplified;
+pub mod table;
+pub mod tinted;
 
 use glam::DVec3;
 
 use crate::catalogue::{Role, Row, sources};
+use crate::gpu::shaders::constants;
 
 /// Reflectance at normal incidence for a relative index of refraction.
 pub fn fresnel_f0(eta: f64) -> f64 {
@@ -28,6 +42,9 @@ pub fn fresnel_dielectric(cos_i: f64, eta: f64) -> f64 {
     (0.5 * a * a * (1.0 + b * b)).min(1.0)
 }
 
+/// What keeps the one case of 0/0 defined: no interface (η = 1, k = 0) at a cosine of 0, which reflects nothing.
+const LEAST_SUM: f64 = constants::LEAST_SUM as f64;
+
 /// Exact conductor against vacuum, per band; complex index `eta` + i `k`.
 pub fn fresnel_conductor(cos_i: f64, eta: DVec3, k: DVec3) -> DVec3 {
     let c2 = cos_i * cos_i;
@@ -35,10 +52,12 @@ pub fn fresnel_conductor(cos_i: f64, eta: DVec3, k: DVec3) -> DVec3 {
     let d = eta * eta - k * k - s2;
     let ek = eta * k;
     let a2b2 = (d * d + 4.0 * ek * ek).map(f64::sqrt);
-    let a = (0.5 * (a2b2 + d)).max(DVec3::ZERO).map(f64::sqrt);
+    // (a2b2 + d)/2 without its cancellation at good metals, where d is negative: (a2b2 + d)(a2b2 − d) = 4 ek².
+    let a2 = DVec3::select(d.cmpge(DVec3::ZERO), 0.5 * (a2b2 + d), 2.0 * ek * ek / (a2b2 - d));
+    let a = a2.map(f64::sqrt);
     let sum = a2b2 + c2;
     let cross_s = 2.0 * cos_i * a;
-    let rs = (sum - cross_s) / (sum + cross_s);
+    let rs = (sum - cross_s) / (sum + cross_s + LEAST_SUM);
     let sum_p = c2 * a2b2 + s2 * s2;
     let cross_p = cross_s * s2;
     let rp = rs * (sum_p - cross_p) / (sum_p + cross_p);
@@ -49,11 +68,16 @@ pub fn fresnel_conductor(cos_i: f64, eta: DVec3, k: DVec3) -> DVec3 {
 ///
 /// A material constant of the multiple-scattering compensation; the error is below 1e-5.
 pub fn fresnel_conductor_average(eta: DVec3, k: DVec3) -> DVec3 {
+    average(|mu| fresnel_conductor(mu, eta, k))
+}
+
+/// 2∫F(μ)μ dμ by the midpoint rule.
+fn average(factor: impl Fn(f64) -> DVec3) -> DVec3 {
     const STEPS: u32 = 256;
     (0..STEPS)
         .map(|i| {
             let mu = (f64::from(i) + 0.5) / f64::from(STEPS);
-            fresnel_conductor(mu, eta, k) * (2.0 * mu / f64::from(STEPS))
+            factor(mu) * (2.0 * mu / f64::from(STEPS))
         })
         .sum()
 }
@@ -79,6 +103,10 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/transport/fresnel.glsl"],
         tests: &[
             "engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric",
+            "engine/src/transport/fresnel.rs::conductors_agree_with_the_complex_form",
+            "engine/src/transport/fresnel.rs::conductors_reflect_as_published",
+            "engine/src/transport/fresnel.rs::curves_dip_where_published",
+            "tests/tests/twins/fresnel_forms.rs::the_conductor_in_single_precision_is_the_complex_form",
             "tests/tests/twins/reflection.rs::fresnel_factors_agree_with_their_twins",
         ],
         experiment: "clerestory agreement --scene cornell-metals,ring-mirror",
@@ -104,6 +132,7 @@ pub(crate) const ROWS: &[Row] = &[
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::random3;
     use super::*;
 
     /// The textbook form with both angles, for comparison.
@@ -156,5 +185,128 @@ mod tests {
         let normal = ((eta - 1.0) * (eta - 1.0) + k * k) / ((eta + 1.0) * (eta + 1.0) + k * k);
         assert!((fresnel_conductor(1.0, eta, k) - normal).abs().max_element() < 1e-14);
         assert_eq!(fresnel_conductor(0.0, eta, k), DVec3::ONE);
+    }
+
+    /// The square root whose real part is at least 0, of a complex number.
+    fn root([re, im]: [f64; 2]) -> [f64; 2] {
+        let size = re.hypot(im);
+        // The part that loses no digits first.
+        if re >= 0.0 {
+            let a = (0.5 * (size + re)).sqrt();
+            [a, if a > 0.0 { 0.5 * im / a } else { 0.0 }]
+        } else {
+            let b = (0.5 * (size - re)).sqrt().copysign(im);
+            [0.5 * im / b, b]
+        }
+    }
+
+    fn squared_ratio(above: [f64; 2], below: [f64; 2]) -> f64 {
+        (above[0] * above[0] + above[1] * above[1]) / (below[0] * below[0] + below[1] * below[1])
+    }
+
+    /// Fresnel's amplitudes as they stand, with a complex cosine behind the interface.
+    fn amplitudes(c: f64, n: f64, k: f64) -> f64 {
+        let epsilon = [n * n - k * k, -2.0 * n * k];
+        let [a, b] = root([epsilon[0] - (1.0 - c) * (1.0 + c), epsilon[1]]);
+        let s = squared_ratio([c - a, -b], [c + a, b]);
+        let p = squared_ratio(
+            [epsilon[0] * c - a, epsilon[1] * c - b],
+            [epsilon[0] * c + a, epsilon[1] * c + b],
+        );
+        0.5 * (s + p)
+    }
+
+    #[test]
+    fn conductors_agree_with_the_complex_form() {
+        let mut worst = 0.0f64;
+        for i in 0..333_334 {
+            let [x, y, z] = [1, 2, 3].map(|seed| random3(i, seed));
+            let c = if i % 10 == 0 { 1e-6 * z.x } else { z.x };
+            let (eta, k) = (0.02 + 4.98 * x, 12.0 * y);
+            let found = fresnel_conductor(c, eta, k);
+            for band in 0..3 {
+                worst = worst.max((found[band] - amplitudes(c, eta[band], k[band])).abs());
+            }
+        }
+        assert!(worst < 1e-13, "{worst:e}");
+        // Grazing incidence; without an interface nothing is reflected even there.
+        let (eta, k) = (DVec3::new(0.04, 1.0, 2.9), DVec3::new(4.8, 0.0, 3.2));
+        for c in [0.0, 1e-7, 1e-4] {
+            let f = fresnel_conductor(c, eta, k);
+            assert!(f.is_finite() && f.y <= c, "{f}");
+            assert!(
+                (f.x - 1.0).abs() < 8.0 * c + 1e-15 && (f.z - 1.0).abs() < 16.0 * c + 1e-15,
+                "{f}"
+            );
+        }
+    }
+
+    #[test]
+    fn conductors_reflect_as_published() {
+        for (name, wavelength, curve) in published::CURVES {
+            let is = |metal: &&published::Metal| metal.name == *name && metal.wavelength == *wavelength;
+            let metal = published::METALS.iter().find(is).expect("metal");
+            for (c, expected) in published::COSINES.into_iter().zip(curve) {
+                let found = fresnel_conductor(c, DVec3::splat(metal.n), DVec3::splat(metal.k)).x;
+                assert!(
+                    (found - expected).abs() <= 7e-5,
+                    "{name} {wavelength} at {c}: {found} {expected}"
+                );
+            }
+        }
+    }
+
+    /// Whether the reflectance falls with the cosine all the way.
+    fn falls(n: f64, k: f64) -> bool {
+        let at = |i: u32| fresnel_conductor(f64::from(i) / 2000.0, DVec3::splat(n), DVec3::splat(k)).x;
+        (0..2000).all(|i| at(i + 1) <= at(i))
+    }
+
+    #[test]
+    fn curves_dip_where_published() {
+        // n = 1.5: reflectance at normal incidence, least reflectance and its cosine, for k from 0.
+        for (k, f0, least, place) in [
+            (0.0, 0.0400, 0.0400, 1.0),
+            (1.0, 0.1724, 0.1724, 1.0),
+            (2.0, 0.4146, 0.4146, 1.0),
+            (3.0, 0.6066, 0.5971, 0.469),
+            (4.0, 0.7303, 0.6931, 0.294),
+            (5.0, 0.8080, 0.7502, 0.220),
+            (6.0, 0.8580, 0.7884, 0.177),
+            (7.0, 0.8914, 0.8160, 0.149),
+            (8.0, 0.9146, 0.8370, 0.129),
+            (9.0, 0.9312, 0.8535, 0.114),
+            (10.0, 0.9435, 0.8669, 0.102),
+        ] {
+            let at = |c: f64| fresnel_conductor(c, DVec3::splat(1.5), DVec3::splat(k)).x;
+            let cosines = (0..=10_000).map(|i| f64::from(i) / 10_000.0);
+            let found = cosines.min_by(|a, b| at(*a).total_cmp(&at(*b))).expect("cosines");
+            assert!(
+                (at(1.0) - f0).abs() < 6e-5 && (at(found) - least).abs() < 6e-5,
+                "{k}: {}",
+                at(found)
+            );
+            assert!((found - place).abs() < 2e-3, "{k}: {found}");
+        }
+        // n and the greatest k up to which the reflectance falls with the cosine.
+        for (n, most) in [
+            (0.4, 2.08),
+            (0.6, 2.19),
+            (0.8, 2.27),
+            (1.0, 2.32),
+            (1.2, 2.36),
+            (1.5, 2.37),
+            (1.8, 2.34),
+            (2.0, 2.30),
+            (2.4, 2.15),
+            (2.8, 1.91),
+            (3.2, 1.52),
+            (3.6, 0.79),
+        ] {
+            assert!(falls(n, most - 0.02) && !falls(n, most + 0.02), "{n} {most}");
+        }
+        // It closes at n = 2 + √3, where Brewster's minimum of dielectrics reaches normal incidence.
+        let closed = 2.0 + 3.0f64.sqrt();
+        assert!(falls(closed - 0.01, 0.0) && !falls(closed + 0.01, 0.0));
     }
 }

@@ -13,6 +13,7 @@ pub mod gpu_scene;
 pub mod light_tree;
 pub mod lights;
 pub mod medium;
+pub mod microfacets;
 pub mod packing;
 pub mod path_set;
 pub mod phase;

@@ -13,6 +13,11 @@ macro_rules! surface_spec {
         $shader::Spec {
             has_metal: bsdf.metal,
             has_conductor: bsdf.conductor,
+            has_schlick_conductor: bsdf.schlick_conductor,
+            has_compensated_conductor: bsdf.compensated_conductor,
+            has_tinted_conductor: bsdf.tinted_conductor,
+            has_simplified_conductor: bsdf.simplified_conductor,
+            has_classic_microfacets: bsdf.classic_microfacets,
             has_phong: bsdf.phong,
             has_specular_layer: bsdf.specular_layer,
             has_transmission: bsdf.transmission,
@@ -31,18 +36,39 @@ pub use surface_spec;
 
 /// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
 /// is off where nothing else is known.
-pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 22] = [
+pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 27] = [
     ("has_metal", METAL_LOBES, "no material is metal"),
     (
         "has_conductor",
         "exact conductors",
-        "no metal has a complex index of refraction",
+        "no metal has a complex index of refraction and the exact form",
+    ),
+    (
+        "has_schlick_conductor",
+        "Schlick's curve of conductors",
+        "no metal names it",
+    ),
+    (
+        "has_compensated_conductor",
+        "compensated curve of conductors",
+        "no metal names it",
+    ),
+    (
+        "has_tinted_conductor",
+        "tinted curve of conductors",
+        "no metal names it",
+    ),
+    (
+        "has_simplified_conductor",
+        "simplified factor of conductors",
+        "no metal names it",
     ),
     (
         "has_specular_layer",
         "dielectric reflection",
         "no material reflects specularly",
     ),
+    ("has_classic_microfacets", "classical microfacets", "no metal has them"),
     ("has_phong", "modified Phong lobes", "no material has one"),
     ("has_transmission", "transmission", "no material transmits"),
     ("has_multiple_scattering", COMPENSATION, "no material is metal"),

@@ -81,7 +81,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
 
     vec3 normal = arrival_normal(a);
     if (WRITE_AOVS && path.bounce == 0u) {
-        vec3 albedo = HAS_CONDUCTOR && (bsdf.flags & BSDF_CONDUCTOR) != 0u ? bsdf.conductor_average : bsdf.base_color;
+        vec3 albedo = bsdf_is_conductor(bsdf) ? conductor_average(bsdf) : bsdf.base_color;
         path_aovs[slot] = PathAov(albedo, hit.t, normal, 1u);
     }
     // Lobes after which the path may go on, and those after which light counts.

@@ -1,11 +1,13 @@
 //! The whole scattering function: values, densities, samples.
 
+use clerestory::scene::FresnelForm;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{
-    BSDF_CONDUCTOR, BSDF_PHONG, Bsdf, BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf,
-    bsdf_sample,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_PHONG,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext,
+    BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf, bsdf_sample,
 };
-use clerestory::transport::fresnel::fresnel_conductor_average;
+use clerestory::transport::fresnel::form::MetalFresnel;
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Tolerance, U, compare, trigonometric_error};
 use clerestory_tests::{twin_kernel, with_gpu};
@@ -19,7 +21,14 @@ twin_kernel!(twin_bsdf);
 fn the_scattering_function_agrees_with_its_twin() {
     with_gpu(|gpu| {
         let metal = (DVec3::new(0.2, 0.4, 1.4), DVec3::new(4.0, 2.4, 1.6));
-        let average = fresnel_conductor_average(metal.0, metal.1).as_vec3();
+        let parameters = |form| MetalFresnel::new(form, metal.0, metal.1).parameters();
+        let exact = parameters(FresnelForm::Exact);
+        let forms = [
+            (parameters(FresnelForm::Rescaled), BSDF_SCHLICK_CONDUCTOR),
+            (parameters(FresnelForm::Compensated), BSDF_COMPENSATED_CONDUCTOR),
+            (parameters(FresnelForm::Hoffman), BSDF_TINTED_CONDUCTOR),
+            (parameters(FresnelForm::Simplified), BSDF_SIMPLIFIED_CONDUCTOR),
+        ];
         let make = |seed: u64, same_side: bool| {
             cases(seed, |r| {
                 let edge = |r: &mut Random| {
@@ -45,10 +54,27 @@ fn the_scattering_function_agrees_with_its_twin() {
                     r.range(0.0, 2.0),
                     r.choose(&[0.0, 1.0]),
                 ]);
-                all.extend(metal.0.as_vec3().to_array());
-                all.extend(metal.1.as_vec3().to_array());
-                all.extend(average.to_array());
-                all.push(f32::from_bits(r.choose(&[0, BSDF_CONDUCTOR, BSDF_PHONG])));
+                // Metals by colour, index, lobe, and by each form of their Fresnel factor.
+                let kind = r.below(3 + forms.len());
+                let classic = r.choose(&[
+                    0,
+                    0,
+                    BSDF_CLASSIC,
+                    BSDF_CLASSIC | BSDF_BECKMANN,
+                    BSDF_CLASSIC | BSDF_COSINE_LOBE | BSDF_SIMPLIFIED_G,
+                ]);
+                let (parameters, flags) = match kind.checked_sub(3) {
+                    Some(form) => forms[form],
+                    None => (exact, [0, BSDF_CONDUCTOR, BSDF_PHONG][kind]),
+                };
+                all.extend(parameters.iter().flat_map(|v| v.as_vec3().to_array()));
+                // Classical microfacets are those of whole metals.
+                if classic != 0 && flags != BSDF_PHONG {
+                    (all[3], all[5]) = (1.0, 0.0);
+                    all.push(f32::from_bits(flags | classic));
+                } else {
+                    all.push(f32::from_bits(flags));
+                }
                 let wo = Vec3::new(r.range(-0.9, 0.9), r.range(-0.4, 0.4), 0.0);
                 let wo = (wo + Vec3::Z * r.choose(&[1.0, -1.0]) * r.range(0.02, 1.0)).normalize();
                 let mut wi = r.direction();

@@ -8,6 +8,7 @@ mod index_peers;
 mod info;
 mod list;
 mod maps;
+mod metal;
 mod progress;
 mod render;
 mod report;
@@ -43,6 +44,7 @@ Examples:
   clerestory scenes                     generated scenes and their parameters
   clerestory compare picture.exr reference.exr --threshold rmse=1e-3
   clerestory maps sky.hdr sky.exr --to octahedron --size 512
+  clerestory metal gold                 its reflectance, and the errors of cheaper forms
   clerestory report --smoke             error against time, in its smallest form
 
 Each command explains itself: clerestory render --help
@@ -70,6 +72,7 @@ enum Command {
     Index(index::Arguments),
     List(list::Arguments),
     Maps(maps::Arguments),
+    Metal(metal::Arguments),
     Bench(bench::Arguments),
     Report(report::Arguments),
     Agreement(agreement::Arguments),
@@ -122,6 +125,7 @@ fn run(program: &Program) -> Outcome<ExitCode> {
         Command::Index(arguments) => index::run(arguments),
         Command::List(arguments) => list::run(arguments),
         Command::Maps(arguments) => maps::run(arguments),
+        Command::Metal(arguments) => metal::run(arguments),
         Command::Bench(arguments) => bench::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Agreement(arguments) => agreement::run(arguments),

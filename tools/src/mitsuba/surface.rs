@@ -1,6 +1,6 @@
 //! Materials as Mitsuba plugins: those that are the same function on both sides, and the reasons against all others.
 
-use clerestory::scene::{AlphaMode, Material};
+use clerestory::scene::{AlphaMode, FresnelForm, Material};
 use glam::Vec3;
 
 use super::rgb;
@@ -100,6 +100,13 @@ fn two_sided(bsdf: &str) -> String {
 
 fn metal(material: &Material, alpha: f32) -> Result<String, String> {
     let index = match material.conductor {
+        Some(_) if material.fresnel != FresnelForm::Exact => {
+            return Err(format!(
+                "a metal by the form {} of its Fresnel factor has no counterpart",
+                material.fresnel
+            ));
+        }
+        _ if material.microfacets.is_some() => return Err("classical microfacets are not exported".into()),
         Some(conductor) => rgb("eta", conductor.eta) + &rgb("k", conductor.k),
         // Schlick's factor with F0 = 1 is 1 at every angle.
         None if material.base_color.truncate() == Vec3::ONE => "<string name=\"material\" value=\"none\"/>".into(),

@@ -19,9 +19,11 @@ sources! {
     ANDERSSON_2020 = "andersson-2020": "P. Andersson, J. Nilsson, T. Akenine-Möller, M. Oskarsson, K. Åström, M. Fairchild", "FLIP: A Difference Evaluator for Alternating Images", "HPG", 2020;
     APETREI_2014 = "apetrei-2014": "C. Apetrei", "Fast and Simple Agglomerative LBVH Construction", "EG UK CGVC", 2014;
     ASHKIANI_2016 = "ashkiani-2016": "S. Ashkiani, A. Davidson, U. Meyer, J. Owens", "GPU Multisplit", "PPoPP", 2016;
+    BECKMANN_SPIZZICHINO_1963 = "beckmann-spizzichino-1963": "P. Beckmann, A. Spizzichino", "The Scattering of Electromagnetic Waves from Rough Surfaces", "Pergamon Press", 1963;
     BELLMAN_1961 = "bellman-1961": "R. Bellman", "On the Approximation of Curves by Line Segments Using Dynamic Programming", "CACM 4(6)", 1961;
     BLASI_1993 = "blasi-1993": "P. Blasi, B. Le Saëc, C. Schlick", "A Rendering Algorithm for Discrete Volume Density Objects", "CGF 12(3)", 1993;
     BLELLOCH_1990 = "blelloch-1990": "G. Blelloch", "Prefix Sums and Their Applications", "CMU-CS-90-190", 1990;
+    BLINN_1977 = "blinn-1977": "J. Blinn", "Models of Light Reflection for Computer Synthesized Pictures", "SIGGRAPH", 1977;
     BLINN_NEWELL_1976 = "blinn-newell-1976": "J. Blinn, M. Newell", "Texture and Reflection in Computer Generated Images", "CACM 19(10)", 1976;
     BORN_WOLF_1999 = "born-wolf-1999": "M. Born, E. Wolf", "Principles of Optics, 7th edition", "Cambridge University Press", 1999;
     BURLEY_2020 = "burley-2020": "B. Burley", "Practical Hash-based Owen Scrambling", "JCGT 10(4)", 2020;
@@ -30,6 +32,7 @@ sources! {
     CLARBERG_2008 = "clarberg-2008": "P. Clarberg", "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", "JGT 13(3)", 2008;
     COLEMAN_1968 = "coleman-1968": "W. Coleman", "Mathematical Verification of a Certain Monte Carlo Sampling Technique", "Nuclear Science and Engineering 32", 1968;
     CONTY_KULLA_2018 = "conty-kulla-2018": "A. Conty Estevez, C. Kulla", "Importance Sampling of Many Lights with Adaptive Tree Splitting", "PACMCGIT 1(2) (HPG)", 2018;
+    COOK_TORRANCE_1982 = "cook-torrance-1982": "R. Cook, K. Torrance", "A Reflectance Model for Computer Graphics", "ACM TOG 1(1)", 1982;
     CORNELL_BOX_DATA = "cornell-box-data": "Cornell University Program of Computer Graphics", "Cornell Box Data", "graphics.cornell.edu/online/box/data.html", 0;
     CROW_1984 = "crow-1984": "F. Crow", "Summed-Area Tables for Texture Mapping", "SIGGRAPH", 1984;
     DEERING_1988 = "deering-1988": "M. Deering et al.", "The Triangle Processor and Normal Vector Shader", "SIGGRAPH", 1988;
@@ -41,12 +44,15 @@ sources! {
     ENGELHARDT_2013 = "engelhardt-2013": "T. Engelhardt", "Efficient From-Point Visibility for Global Illumination in Virtual Scenes with Participating Media", "PhD thesis, KIT", 2013;
     ENGELHARDT_DACHSBACHER_2008 = "engelhardt-dachsbacher-2008": "T. Engelhardt, C. Dachsbacher", "Octahedron Environment Maps", "VMV", 2008;
     FABIANOWSKI_2011 = "fabianowski-2011": "B. Fabianowski", "Interactive Manycore Photon Mapping", "PhD thesis, Trinity College Dublin", 2011;
+    FEYNMAN_1964 = "feynman-1964": "R. Feynman, R. Leighton, M. Sands", "The Feynman Lectures on Physics", "Addison-Wesley", 1964;
     FOLEY_SUGERMAN_2005 = "foley-sugerman-2005": "T. Foley, J. Sugerman", "KD-Tree Acceleration Structures for a GPU Raytracer", "Graphics Hardware", 2005;
     GANESTAM_2015 = "ganestam-2015": "P. Ganestam, R. Barringer, M. Doggett, T. Akenine-Möller", "Bonsai: Rapid Bounding Volume Hierarchy Generation using Mini Trees", "JCGT 4(3)", 2015;
     GERASIMOV_2004 = "gerasimov-2004": "P. Gerasimov", "Omnidirectional Shadow Mapping", "GPU Gems", 2004;
     GORAL_1984 = "goral-1984": "C. Goral, K. Torrance, D. Greenberg, B. Battaile", "Modeling the Interaction of Light Between Diffuse Surfaces", "SIGGRAPH", 1984;
     GREENE_1986 = "greene-1986": "N. Greene", "Environment Mapping and Other Applications of World Projections", "IEEE CG&A 6(11)", 1986;
+    GULBRANDSEN_2014 = "gulbrandsen-2014": "O. Gulbrandsen", "Artist Friendly Metallic Fresnel", "JCGT 3(4)", 2014;
     HACHISUKA_JENSEN_2009 = "hachisuka-jensen-2009": "T. Hachisuka, H. W. Jensen", "Stochastic Progressive Photon Mapping", "ACM TOG 28(5)", 2009;
+    HAGEMANN_1975 = "hagemann-1975": "H.-J. Hagemann, W. Gudat, C. Kunz", "Optical Constants from the Far Infrared to the X-Ray Region: Mg, Al, Cu, Ag, Au, Bi, C, and Al2O3", "J. Opt. Soc. Am. 65", 1975;
     HAINES_1987 = "haines-1987": "E. Haines", "A Proposal for Standard Graphics Environments", "IEEE CG&A 7(11)", 1987;
     HAINES_2019 = "haines-2019": "E. Haines et al.", "Precision Improvements for Ray/Sphere Intersection", "Ray Tracing Gems, chapter 7", 2019;
     HECKBERT_1990 = "heckbert-1990": "P. Heckbert", "Adaptive Radiosity Textures for Bidirectional Ray Tracing", "SIGGRAPH", 1990;
@@ -54,6 +60,7 @@ sources! {
     HEITZ_2014 = "heitz-2014": "E. Heitz", "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", "JCGT 3(2)", 2014;
     HENYEY_GREENSTEIN_1941 = "henyey-greenstein-1941": "L. Henyey, J. Greenstein", "Diffuse Radiation in the Galaxy", "ApJ 93", 1941;
     HOER_LOVE_1965 = "hoer-love-1965": "C. Hoer, C. Love", "Exact Inductance Equations for Rectangular Conductors", "J. Res. NBS 69C", 1965;
+    HOFFMAN_2019 = "hoffman-2019": "N. Hoffman", "Fresnel Equations Considered Harmful", "Eurographics Workshop on Material Appearance Modeling", 2019;
     HOLBERT_2011 = "holbert-2011": "D. Holbert", "Saying Goodbye to Shadow Acne", "GDC", 2011;
     HORN_2007 = "horn-2007": "D. Horn, J. Sugerman, M. Houston, P. Hanrahan", "Interactive k-D Tree GPU Raytracing", "I3D", 2007;
     IEC_61966_2_1 = "iec-61966-2-1": "IEC", "61966-2-1: Default RGB Colour Space, sRGB", "", 1999;
@@ -84,12 +91,14 @@ sources! {
     KNAUS_ZWICKER_2011 = "knaus-zwicker-2011": "C. Knaus, M. Zwicker", "Progressive Photon Mapping: A Probabilistic Approach", "ACM TOG 30(3)", 2011;
     KULLA_CONTY_2017 = "kulla-conty-2017": "C. Kulla, A. Conty", "Revisiting Physically Based Shading at Imageworks", "SIGGRAPH course notes", 2017;
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;
+    KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;
     LAFORTUNE_WILLEMS_1994 = "lafortune-willems-1994": "E. Lafortune, Y. Willems", "Using the Modified Phong Reflectance Model for Physically Based Rendering", "Report CW 197, KU Leuven", 1994;
     LAINE_2010 = "laine-2010": "S. Laine", "Restart Trail for Stackless BVH Traversal", "HPG", 2010;
     LAINE_2013 = "laine-2013": "S. Laine, T. Karras, T. Aila", "Megakernels Considered Harmful: Wavefront Path Tracing on GPUs", "HPG", 2013;
     LAINE_KARRAS_2011 = "laine-karras-2011": "S. Laine, T. Karras", "Stratified Sampling for Stochastic Transparency", "EGSR", 2011;
     LAMBERT_1760 = "lambert-1760": "J. H. Lambert", "Photometria", "", 1760;
     LAUTERBACH_2009 = "lauterbach-2009": "C. Lauterbach et al.", "Fast BVH Construction on GPUs", "Eurographics", 2009;
+    LAZANYI_SZIRMAY_KALOS_2005 = "lazanyi-szirmay-kalos-2005": "I. Lazányi, L. Szirmay-Kalos", "Fresnel Term Approximations for Metals", "WSCG short papers", 2005;
     MEISTER_BITTNER_2018 = "meister-bittner-2018": "D. Meister, J. Bittner", "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", "CGF 37(2)", 2018;
     MEYER_2010 = "meyer-2010": "Q. Meyer et al.", "On Floating-Point Normal Vectors", "EGSR", 2010;
     MIKKELSEN_2008 = "mikkelsen-2008": "M. S. Mikkelsen", "Simulation of Wrinkled Surfaces Revisited", "Master's thesis, University of Copenhagen", 2008;
@@ -112,6 +121,7 @@ sources! {
     SAITO_TAKAHASHI_1990 = "saito-takahashi-1990": "T. Saito, T. Takahashi", "Comprehensible Rendering of 3-D Shapes", "SIGGRAPH", 1990;
     SATISH_2009 = "satish-2009": "N. Satish, M. Harris, M. Garland", "Designing Efficient Sorting Algorithms for Manycore GPUs", "IPDPS", 2009;
     SCHJOTH_2007 = "schjoth-2007": "L. Schjøth, J. Frisvad, K. Erleben, J. Sporring", "Photon Differentials", "GRAPHITE", 2007;
+    SCHLICK_1994 = "schlick-1994": "C. Schlick", "An Inexpensive BRDF Model for Physically-based Rendering", "Eurographics", 1994;
     SENGUPTA_2007 = "sengupta-2007": "S. Sengupta, M. Harris, Y. Zhang, J. Owens", "Scan Primitives for GPU Computing", "Graphics Hardware", 2007;
     SHIRLEY_1996 = "shirley-1996": "P. Shirley, C. Wang, K. Zimmerman", "Monte Carlo Techniques for Direct Lighting Calculations", "ACM TOG 15(1)", 1996;
     SHIRLEY_1997 = "shirley-1997": "P. Shirley et al.", "A Practitioners' Assessment of Light Reflection Models", "Pacific Graphics", 1997;

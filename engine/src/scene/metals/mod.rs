@@ -1,85 +1,110 @@
 //! Complex indices of refraction of common metals, per RGB channel, from measured spectra.
 //!
+//! Four of them stand beside a second sample (`hagemann.rs`), under names of their own; a scene can name a file of its own, too ([`IndexSpectrum`]).
+//!
 //! A channel's n and k are the means of the measured n and k (`spectra.rs`, interpolated linearly) over the channel's sensitivity
 //! (`observer.rs`): CIE 1931 matching functions under D65, taken to linear Rec. 709. Guarantees, by the tests below: the normal
 //! reflectance of three of the nine spectra (chromium, iron, copper) is within 0.0035 of what others published for the same measurements;
 //! that of the three channels differs from that of its spectrum by at most 0.012, where the colour lies inside Rec. 709. Gold's red lies beyond it (1.04): no index of refraction reflects more than
 //! comes in, and the channel has 0.98.
 
+pub mod artistic;
+mod form;
+mod hagemann;
+mod index_spectrum;
 mod observer;
 mod spectra;
 
-use glam::DVec3;
-
 use super::ConductorIor;
 use crate::catalogue::{Role, Row, sources};
+pub use artistic::by_colors;
+pub use form::FresnelForm;
+pub use index_spectrum::IndexSpectrum;
 use spectra::Spectrum;
 
 impl Spectrum {
-    /// One of the quantities at a wavelength in nanometres: 1 is n, 2 is k. Outside of the samples the nearest one.
-    fn at(&self, wavelength: f64, quantity: usize) -> f64 {
-        let number = |sample: &[u32; 3], quantity: usize| f64::from(sample[quantity]) * spectra::UNITS[quantity];
-        let above = self.samples.partition_point(|sample| number(sample, 0) < wavelength);
-        let (Some(low), Some(high)) = (
-            self.samples.get(above.saturating_sub(1)),
-            self.samples.get(above).or(self.samples.last()),
-        ) else {
-            return 0.0;
-        };
-        let (from, to) = (number(low, 0), number(high, 0));
-        let t = if to > from {
-            (wavelength - from) / (to - from)
-        } else {
-            0.0
-        };
-        number(low, quantity) + t * (number(high, quantity) - number(low, quantity))
+    fn index(&self) -> IndexSpectrum {
+        let number = |sample: &[u32; 3]| [0, 1, 2].map(|i| f64::from(sample[i]) * spectra::UNITS[i]);
+        IndexSpectrum::new(self.samples.iter().map(number).collect())
     }
+}
 
-    fn mean(&self, quantity: usize) -> DVec3 {
-        observer::project(|wavelength| self.at(wavelength, quantity))
-    }
+/// The metals, and other samples of some.
+fn all() -> impl Iterator<Item = &'static Spectrum> {
+    spectra::ALL.iter().chain(hagemann::ALL)
 }
 
 /// The names that [`by_name`] knows.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    spectra::ALL.iter().map(|spectrum| spectrum.name)
+    all().map(|spectrum| spectrum.name)
 }
 
-/// The complex index of refraction of a metal by its name (`aluminum` is understood too).
-pub fn by_name(name: &str) -> Option<ConductorIor> {
+/// The measured spectrum of a metal by its name (`aluminum` is understood too).
+pub fn spectrum(name: &str) -> Option<IndexSpectrum> {
     let name = if name == "aluminum" { "aluminium" } else { name };
-    let spectrum = spectra::ALL.iter().find(|spectrum| spectrum.name == name)?;
-    Some(ConductorIor {
-        eta: spectrum.mean(1).as_vec3(),
-        k: spectrum.mean(2).as_vec3(),
-    })
+    all().find(|spectrum| spectrum.name == name).map(Spectrum::index)
+}
+
+/// The complex index of refraction of a metal by its name, per RGB channel.
+pub fn by_name(name: &str) -> Option<ConductorIor> {
+    spectrum(name).map(|spectrum| spectrum.channels())
 }
 
 /// Rows of the catalogue.
-pub(crate) const ROWS: &[Row] = &[Row {
-    id: "CL-METALS",
-    name: "measured metals: gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt",
-    role: Role::PartOf("BG-3"),
-    limits: "One sample of each metal: reflectances that others measured differ by up to 0.01 (silver, aluminium), 0.07 (gold, nickel, iron, titanium), 0.11 (chromium) and, at the edge of copper near 590 nm, 0.18, and cobalt's were compared with none; three channels for a spectrum are off by up to 0.012, and gold's red, which is out of gamut, is 0.98.",
-    sources: &[
-        sources::JOHNSON_CHRISTY_1972.whole(),
-        sources::JOHNSON_CHRISTY_1974.whole(),
-        sources::RAKIC_1995.whole(),
-    ],
-    tests: &[
-        "engine/src/scene/metals/mod.rs::spectra_reflect_what_others_computed_of_them",
-        "engine/src/scene/metals/mod.rs::spectra_reflect_as_others_measured_within_the_spread_of_samples",
-        "engine/src/scene/metals/mod.rs::channels_reflect_as_their_spectra_do",
-        "engine/src/scene/metals/mod.rs::channels_reflect_like_other_samples_of_the_metals",
-    ],
-    experiment: "clerestory agreement --scene cornell-metals",
-    api: &["clerestory::scene::metals"],
-    ..Row::of(file!())
-}];
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "MET-F5",
+        name: "indices of refraction of metals at 435, 550 and 700 nm",
+        role: Role::PartOf("BG-3"),
+        limits: "Three wavelengths stand for red, green and blue as they are, which is not what an observer sees: CL-METALS has means over the channels.",
+        sources: &[
+            sources::JOHNSON_CHRISTY_1972.whole(),
+            sources::JOHNSON_CHRISTY_1974.whole(),
+            sources::RAKIC_1995.whole(),
+            sources::HAGEMANN_1975.whole(),
+        ],
+        tests: &[
+            "engine/src/transport/fresnel/form.rs::constants_are_those_of_the_spectra",
+            "engine/src/transport/fresnel/form.rs::hagemanns_metals_give_the_published_headline",
+            "engine/src/scene/metals/index_spectrum.rs::texts_of_spectra_are_read_and_checked",
+        ],
+        experiment: "clerestory metal gold",
+        api: &["clerestory::scene::metals::IndexSpectrum"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-METALS",
+        name: "measured metals: gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt",
+        role: Role::PartOf("BG-3"),
+        limits: "One sample of each metal: reflectances that others measured differ by up to 0.01 (silver, aluminium), 0.07 (gold, nickel, iron, titanium), 0.11 (chromium) and, at the edge of copper near 590 nm, 0.18, and cobalt's were compared with none; three channels for a spectrum are off by up to 0.012, and gold's red, which is out of gamut, is 0.98.",
+        sources: &[
+            sources::JOHNSON_CHRISTY_1972.whole(),
+            sources::JOHNSON_CHRISTY_1974.whole(),
+            sources::RAKIC_1995.whole(),
+        ],
+        tests: &[
+            "engine/src/scene/metals/mod.rs::spectra_reflect_what_others_computed_of_them",
+            "engine/src/scene/metals/mod.rs::spectra_reflect_as_others_measured_within_the_spread_of_samples",
+            "engine/src/scene/metals/mod.rs::channels_reflect_as_their_spectra_do",
+            "engine/src/scene/metals/mod.rs::channels_reflect_like_other_samples_of_the_metals",
+        ],
+        experiment: "clerestory agreement --scene cornell-metals",
+        api: &["clerestory::scene::metals"],
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
+
+    impl Spectrum {
+        /// One of the quantities at a wavelength in nanometres: 1 is n, 2 is k.
+        fn at(&self, wavelength: f64, quantity: usize) -> f64 {
+            self.index().at(wavelength)[quantity - 1]
+        }
+    }
 
     /// Reflectance at normal incidence.
     fn reflectance(n: f64, k: f64) -> f64 {
@@ -102,7 +127,7 @@ mod tests {
 
     #[test]
     fn spectra_cover_the_visible_wavelengths_in_order() {
-        for spectrum in spectra::ALL {
+        for spectrum in all() {
             let wavelengths: Vec<u32> = spectrum.samples.iter().map(|sample| sample[0]).collect();
             assert!(wavelengths.is_sorted_by(|a, b| a < b), "{}", spectrum.name);
             assert!(
@@ -122,7 +147,7 @@ mod tests {
             assert_eq!(spectrum.at(0.0, 2), first[2] * 1e-4, "{}", spectrum.name);
         }
         assert!(by_name("aluminum").is_some() && by_name("mithril").is_none());
-        assert_eq!(names().count(), 9);
+        assert_eq!(names().count(), 13);
     }
 
     #[test]

@@ -14,6 +14,10 @@
 //! [metals]                      # by material name
 //! ring = "gold"                 # gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt
 //! bowl = { eta = [1.4, 0.9, 0.7], k = [7.6, 6.4, 5.6] }
+//! vase = { metal = "gold", fresnel = "compensated" }  # exact, schlick, rescaled, compensated, f82-tint, hoffman, simplified
+//! cup = { reflectance = [0.9, 0.7, 0.4], edge_tint = [0.8, 0.6, 0.5] }
+//! coin = { spectrum = "coin.csv" }                    # lines of a wavelength in nanometres, n, k
+//! pan = { metal = "copper", distribution = "beckmann", geometry = "cook-torrance" }  # ggx, beckmann, cosine-lobe; cook-torrance, simplified
 //!
 //! [phong]                       # by material name: the modified Phong model in place of metal and coat; no transmission
 //! floor = { exponent = 50.0, share = 0.4 }    # of the reflectance, the base colour; the rest is Lambert's
@@ -45,7 +49,8 @@ use serde::Deserialize;
 use medium::MediumTable;
 
 use super::{
-    Camera, ConductorIor, Environment, Material, Note, Projection, Scene, builtin, files, metals, phong_roughness,
+    Camera, ConductorIor, Distribution, Environment, FresnelForm, Geometry, Material, Microfacets, Note, Projection,
+    Scene, builtin, files, metals, phong_roughness,
 };
 use crate::catalogue::{Role, Row};
 use crate::input::InputFiles;
@@ -91,17 +96,39 @@ struct EnvironmentTable {
 }
 
 #[derive(Debug, Deserialize)]
-#[serde(untagged, expecting = "a metal's name or a table with eta and k")]
+#[serde(
+    untagged,
+    expecting = "a metal's name, or a table with metal, spectrum, eta and k, or reflectance and edge_tint, and if wanted fresnel: exact, \
+                 schlick, rescaled, compensated, f82-tint, hoffman or simplified; distribution: ggx, beckmann or cosine-lobe; geometry: \
+                 cook-torrance or simplified"
+)]
 enum Metal {
     Named(String),
-    Measured(MeasuredMetal),
+    Described(MetalTable),
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct MeasuredMetal {
-    eta: [f32; 3],
-    k: [f32; 3],
+struct MetalTable {
+    metal: Option<String>,
+    spectrum: Option<String>,
+    eta: Option<[f32; 3]>,
+    k: Option<[f32; 3]>,
+    reflectance: Option<[f32; 3]>,
+    edge_tint: Option<[f32; 3]>,
+    fresnel: Option<FresnelForm>,
+    distribution: Option<Distribution>,
+    geometry: Option<Geometry>,
+}
+
+impl MetalTable {
+    /// Classical microfacets where either part is named.
+    fn microfacets(&self) -> Option<Microfacets> {
+        (self.distribution.is_some() || self.geometry.is_some()).then(|| Microfacets {
+            distribution: self.distribution.unwrap_or_default(),
+            geometry: self.geometry.unwrap_or_default(),
+        })
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -216,7 +243,7 @@ impl Sidecar {
         }
         let named = named(scene.materials.iter().map(|material| material.name.as_str()));
         for (name, metal) in &content.metals {
-            self.metal(scene, &named, name, metal)?;
+            self.metal(scene, &named, name, metal, read)?;
         }
         for (name, table) in &content.phong {
             self.phong(scene, &named, name, table)?;
@@ -288,30 +315,71 @@ impl Sidecar {
         Ok((environment, note))
     }
 
-    fn metal(&self, scene: &mut Scene, named: &Named, name: &str, metal: &Metal) -> Result<()> {
+    fn metal(&self, scene: &mut Scene, named: &Named, name: &str, metal: &Metal, read: &InputFiles<'_>) -> Result<()> {
         let key = format!("metals.{name}");
-        let conductor = match metal {
-            Metal::Named(metal) => metals::by_name(metal).ok_or_else(|| {
-                let known: Vec<&str> = metals::names().collect();
-                self.fault(
-                    &key,
-                    format!("metal {metal:?} is not known; known: {}", known.join(", ")),
-                )
-            })?,
-            Metal::Measured(MeasuredMetal { eta, k }) => {
-                let sound =
-                    eta.iter().all(|e| e.is_finite() && *e > 0.0) && k.iter().all(|k| k.is_finite() && *k >= 0.0);
-                self.require(sound, &key, "needs eta above 0 and k at least 0")?;
-                ConductorIor {
-                    eta: Vec3::from_array(*eta),
-                    k: Vec3::from_array(*k),
-                }
-            }
+        let (conductor, fresnel, microfacets) = match metal {
+            Metal::Named(metal) => (self.named_metal(&key, metal)?, FresnelForm::Exact, None),
+            Metal::Described(table) => (
+                self.described_metal(&key, table, read)?,
+                table.fresnel.unwrap_or_default(),
+                table.microfacets(),
+            ),
         };
         self.change_materials(scene, named, [&key, name], |material| {
             material.conductor = Some(conductor);
+            material.fresnel = fresnel;
+            material.microfacets = microfacets;
             material.metallic = 1.0;
         })
+    }
+
+    fn named_metal(&self, key: &str, metal: &str) -> Result<ConductorIor> {
+        metals::by_name(metal).ok_or_else(|| {
+            let known: Vec<&str> = metals::names().collect();
+            self.fault(
+                key,
+                format!("metal {metal:?} is not known; known: {}", known.join(", ")),
+            )
+        })
+    }
+
+    fn described_metal(&self, key: &str, table: &MetalTable, read: &InputFiles<'_>) -> Result<ConductorIor> {
+        let colors = [table.eta, table.k, table.reflectance, table.edge_tint];
+        let given = colors.iter().flatten().count()
+            + usize::from(table.metal.is_some())
+            + usize::from(table.spectrum.is_some());
+        let [index, two_colors] = [table.eta.zip(table.k), table.reflectance.zip(table.edge_tint)];
+        match (given, &table.metal, &table.spectrum, index, two_colors) {
+            (1, Some(metal), ..) => self.named_metal(key, metal),
+            (1, _, Some(file), ..) => self.spectrum(&format!("{key}.spectrum"), file, read),
+            (2, _, _, Some((eta, k)), _) => {
+                let sound =
+                    eta.iter().all(|e| e.is_finite() && *e > 0.0) && k.iter().all(|k| k.is_finite() && *k >= 0.0);
+                self.require(sound, key, "needs eta above 0 and k at least 0")?;
+                Ok(ConductorIor {
+                    eta: Vec3::from_array(eta),
+                    k: Vec3::from_array(k),
+                })
+            }
+            (2, .., Some((reflectance, edge_tint))) => {
+                let sound = reflectance.iter().chain(&edge_tint).all(|x| (0.0..=1.0).contains(x));
+                self.require(sound, key, "needs reflectance and edge_tint from 0 to 1")?;
+                Ok(metals::by_colors(reflectance.into(), edge_tint.into()))
+            }
+            _ => Err(self.fault(
+                key,
+                "needs one of: metal; spectrum; eta and k; reflectance and edge_tint",
+            )),
+        }
+    }
+
+    /// The channels of a spectrum in a file of its own.
+    fn spectrum(&self, key: &str, file: &str, read: &InputFiles<'_>) -> Result<ConductorIor> {
+        let bytes = files::read(&self.folder().join(file), read).map_err(|error| self.in_file_of(key, error))?;
+        let fault = |cause: &str| self.fault(key, format!("{file}: {cause}"));
+        let text = std::str::from_utf8(&bytes).map_err(|_| fault("is not UTF-8"))?;
+        let spectrum = metals::IndexSpectrum::parse(text).map_err(|cause| fault(&cause))?;
+        Ok(spectrum.channels())
     }
 
     fn phong(&self, scene: &mut Scene, named: &Named, name: &str, table: &PhongTable) -> Result<()> {

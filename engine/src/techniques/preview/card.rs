@@ -36,6 +36,7 @@ const KERNELS: [&ShaderInfo; 7] = [
 /// Why there is nothing of a scene with media.
 pub(super) const NO_MEDIA: &str = "participating media are not shown";
 /// Why there is nothing of a scene with modified Phong surfaces.
+pub(super) const NO_CLASSIC: &str = "its probes are filtered by the GGX lobe, not by classical microfacets";
 pub(super) const NO_PHONG: &str = "its probes are not filtered by modified Phong lobes";
 
 /// The catalogue's entry.
@@ -71,6 +72,7 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
             "nothing is seen through materials that transmit".into(),
         ),
         (profile.has_phong, NO_PHONG.into()),
+        (profile.has_classic_microfacets, NO_CLASSIC.into()),
         (profile.alpha.blend, "partial alpha is drawn opaque".into()),
         (profile.media.any(), NO_MEDIA.into()),
         (

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::card::{NO_MEDIA, NO_PHONG};
+use super::card::{NO_CLASSIC, NO_MEDIA, NO_PHONG};
 use super::lights::{LightRoom, PreviewLights, PreviewShadows};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use crate::gpu::{Area, Gpu, PipelineInfo, Recorder};
@@ -45,6 +45,12 @@ impl Drawing {
             return Err(Error::Unsupported {
                 technique: "preview".into(),
                 reasons: vec![NO_PHONG.into()],
+            });
+        }
+        if has_probes && scene.profile().has_classic_microfacets {
+            return Err(Error::Unsupported {
+                technique: "preview".into(),
+                reasons: vec![NO_CLASSIC.into()],
             });
         }
         let surfaces = scene.surfaces();

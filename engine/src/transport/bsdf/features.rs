@@ -1,6 +1,6 @@
 //! Which terms of the scattering function a scene needs.
 
-use crate::scene::Material;
+use crate::scene::{FresnelForm, Material};
 use crate::transport::albedo::AlbedoTable;
 
 /// Which terms are compiled in: the values of the shader's specialization constants of the same names in capitals (`HAS_METAL` …).
@@ -13,6 +13,16 @@ pub struct BsdfFeatures {
     pub metal: bool,
     /// Some metal is an exact conductor.
     pub conductor: bool,
+    /// Some conductor has Schlick's curve, its own or rescaled.
+    pub schlick_conductor: bool,
+    /// Some conductor has a compensated curve.
+    pub compensated_conductor: bool,
+    /// Some conductor has a tinted curve.
+    pub tinted_conductor: bool,
+    /// Some conductor has the simplified factor.
+    pub simplified_conductor: bool,
+    /// Some metal has classical microfacets.
+    pub classic_microfacets: bool,
     /// Some metal is a modified Phong lobe.
     pub phong: bool,
     /// Some dielectric has `specular` > 0.
@@ -30,6 +40,11 @@ impl BsdfFeatures {
     pub const ALL: Self = Self {
         metal: true,
         conductor: true,
+        schlick_conductor: true,
+        compensated_conductor: true,
+        tinted_conductor: true,
+        simplified_conductor: true,
+        classic_microfacets: true,
         phong: true,
         specular_layer: true,
         transmission: true,
@@ -40,6 +55,11 @@ impl BsdfFeatures {
     pub const NONE: Self = Self {
         metal: false,
         conductor: false,
+        schlick_conductor: false,
+        compensated_conductor: false,
+        tinted_conductor: false,
+        simplified_conductor: false,
+        classic_microfacets: false,
         phong: false,
         specular_layer: false,
         transmission: false,
@@ -54,13 +74,19 @@ impl BsdfFeatures {
             .filter(|m| !m.unlit)
             .fold(Self::NONE, |f, m| Self {
                 metal: f.metal || m.metallic > 0.0,
-                conductor: f.conductor || (m.metallic > 0.0 && m.conductor.is_some()),
+                conductor: f.conductor || m.has_conductor(&[FresnelForm::Exact]),
+                schlick_conductor: f.schlick_conductor
+                    || m.has_conductor(&[FresnelForm::Schlick, FresnelForm::Rescaled]),
+                compensated_conductor: f.compensated_conductor || m.has_conductor(&[FresnelForm::Compensated]),
+                tinted_conductor: f.tinted_conductor || m.has_conductor(&[FresnelForm::F82Tint, FresnelForm::Hoffman]),
+                simplified_conductor: f.simplified_conductor || m.has_conductor(&[FresnelForm::Simplified]),
+                classic_microfacets: f.classic_microfacets || m.microfacets.is_some(),
                 phong: f.phong || (m.metallic > 0.0 && m.phong),
                 specular_layer: f.specular_layer
                     || (m.specular > 0.0 && m.metallic < 1.0)
                     || (m.specular > 0.0 && m.metallic_roughness_texture.is_some()),
                 transmission: f.transmission || m.transmission > 0.0,
-                multiple_scattering: f.multiple_scattering || (m.metallic > 0.0 && !m.phong),
+                multiple_scattering: f.multiple_scattering || (m.metallic > 0.0 && !m.phong && m.microfacets.is_none()),
                 separable_masking: false,
             })
     }

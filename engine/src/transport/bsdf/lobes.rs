@@ -5,11 +5,18 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::{
-    BSDF_CONDUCTOR, BSDF_IMPORTANCE, BSDF_PHONG, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
-    LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_IMPORTANCE,
+    BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf,
+    BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed,
+    mean3,
 };
 use crate::transport::albedo::{albedo_average, albedo_layer, albedo_lookup};
+use crate::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
+use crate::transport::fresnel::simplified::fresnel_simplified;
+use crate::transport::fresnel::tinted::fresnel_tinted;
 use crate::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_f0, fresnel_schlick};
+use crate::transport::ggx::{ggx_d, ggx_visible_pdf};
+use crate::transport::microfacets::{beckmann_d, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, kelemen_g};
 
 /// Reflectances of the two lobes that are sampled by the cosine: the diffuse base and the metal's multiple scattering.
 pub(super) struct CosineLobes {
@@ -35,6 +42,35 @@ impl BsdfContext<'_> {
     /// Whether its metal is a modified Phong lobe.
     pub(super) fn is_phong(&self, b: &Bsdf) -> bool {
         self.features.phong && b.flags & BSDF_PHONG != 0
+    }
+
+    /// Whether its metal has classical microfacets that are no mirror.
+    pub(super) fn is_classic(&self, b: &Bsdf) -> bool {
+        self.features.classic_microfacets && b.flags & BSDF_CLASSIC != 0 && !b.is_delta()
+    }
+
+    /// f |cos| of a classical metal, and the density of the directions that its normals reflect; both cosines positive.
+    pub(super) fn classic_eval(&self, b: &Bsdf, wo: DVec3, wi: DVec3) -> (DVec3, f64) {
+        let h = (wo + wi).normalize();
+        let cos_h = wo.dot(h);
+        if cos_h <= 0.0 || h.z <= 0.0 {
+            return (DVec3::ZERO, 0.0);
+        }
+        let (d, normals) = if b.flags & BSDF_BECKMANN != 0 {
+            let d = beckmann_d(h, b.alpha);
+            (d, d * h.z)
+        } else if b.flags & BSDF_COSINE_LOBE != 0 {
+            let d = cosine_lobe_d(h, cosine_lobe_exponent(b.alpha));
+            (d, d * h.z)
+        } else {
+            (ggx_d(h, b.alpha), ggx_visible_pdf(wo, h, b.alpha))
+        };
+        let g = if b.flags & BSDF_SIMPLIFIED_G != 0 {
+            kelemen_g(wi, h)
+        } else {
+            cook_torrance_g(wi, wo, h)
+        };
+        (self.metal_fresnel(b, cos_h) * (d * g * wi.z), normals / (4.0 * cos_h))
     }
 
     /// Reflectance of the dielectric layer; `eta` is that beyond over that on the side of ωo.
@@ -63,10 +99,43 @@ impl BsdfContext<'_> {
         if self.is_phong(b) {
             return b.base_color;
         }
-        if self.features.conductor && b.flags & BSDF_CONDUCTOR != 0 {
-            return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
+        let [eta, k, exponent] = [b.conductor_eta, b.conductor_k, b.conductor_average];
+        match b.flags & self.conductor_flags() {
+            BSDF_CONDUCTOR => fresnel_conductor(cos_h, eta, k),
+            BSDF_SCHLICK_CONDUCTOR => fresnel_schlick(cos_h, eta),
+            BSDF_COMPENSATED_CONDUCTOR => fresnel_compensated(cos_h, eta, k, exponent),
+            BSDF_TINTED_CONDUCTOR => fresnel_tinted(cos_h, eta, k),
+            BSDF_SIMPLIFIED_CONDUCTOR => fresnel_simplified(cos_h, eta, k),
+            _ => fresnel_schlick(cos_h, b.base_color),
         }
-        fresnel_schlick(cos_h, b.base_color)
+    }
+
+    /// The flags of the conductors that are compiled in.
+    fn conductor_flags(&self) -> u32 {
+        let f = &self.features;
+        [
+            (f.conductor, BSDF_CONDUCTOR),
+            (f.schlick_conductor, BSDF_SCHLICK_CONDUCTOR),
+            (f.compensated_conductor, BSDF_COMPENSATED_CONDUCTOR),
+            (f.tinted_conductor, BSDF_TINTED_CONDUCTOR),
+            (f.simplified_conductor, BSDF_SIMPLIFIED_CONDUCTOR),
+        ]
+        .into_iter()
+        .filter_map(|(on, flag)| on.then_some(flag))
+        .sum()
+    }
+
+    /// Cosine-weighted hemispherical average of a conductor's factor; `None` for a metal by its base colour.
+    fn conductor_average(&self, b: &Bsdf) -> Option<DVec3> {
+        match b.flags & self.conductor_flags() {
+            0 => None,
+            BSDF_COMPENSATED_CONDUCTOR => Some(fresnel_compensated_average(
+                b.conductor_eta,
+                b.conductor_k,
+                b.conductor_average,
+            )),
+            _ => Some(b.conductor_average),
+        }
     }
 
     /// What a microfacet reflects and what goes through it, as the mask allows.
@@ -117,19 +186,18 @@ impl BsdfContext<'_> {
             diffuse = opaque * b.base_color * self.layer_loss(b, cos_o);
         }
         let mut metal = DVec3::ZERO;
-        let compensated =
-            self.features.metal && self.features.multiple_scattering && !b.is_delta() && !self.is_phong(b);
+        let compensated = self.features.metal
+            && self.features.multiple_scattering
+            && !b.is_delta()
+            && !self.is_phong(b)
+            && !self.is_classic(b);
         if compensated && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION) {
             let e_average = albedo_average(self.table, 0, b.alpha);
             let loss = 1.0 - e_average;
             if loss > LOSS_MIN {
-                let exact = self.features.conductor && b.flags & BSDF_CONDUCTOR != 0;
                 // 1/21 = 2∫(1 − μ)⁵ μ dμ
-                let f = if exact {
-                    b.conductor_average
-                } else {
-                    b.base_color.lerp(DVec3::ONE, 1.0 / 21.0)
-                };
+                let by_color = || b.base_color.lerp(DVec3::ONE, 1.0 / 21.0);
+                let f = self.conductor_average(b).unwrap_or_else(by_color);
                 let escape = f * f * e_average / (DVec3::ONE - f * loss);
                 metal = m * escape * (1.0 - albedo_lookup(self.table, 0, cos_o, b.alpha));
             }

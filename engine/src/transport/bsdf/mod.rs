@@ -6,7 +6,7 @@
 //!   back all that the layer lets through (Kelemen and Szirmay-Kalos 2001; Shirley et al. 1997);
 //! - f_transmission: Walter et al. (EGSR 2007) through solids, with radiance scaled by 1/η²; a mirrored GGX lobe through thin walls
 //!   (`KHR_materials_transmission`);
-//! - f_metal: GGX with Schlick's or the exact conductor's Fresnel factor, plus the multiple-scattering lobe of Kulla and Conty (2017); or
+//! - f_metal: GGX with Schlick's or a conductor's Fresnel factor, exact or in the form that it names, plus the multiple-scattering lobe of Kulla and Conty (2017); or
 //!   base colour · the modified Phong lobe ([`phong`](super::phong)), meant for surfaces without layer and transmission, which are then
 //!   base colour · (m Phong + (1 − m) Lambert).
 //!
@@ -27,8 +27,10 @@ pub use self::features::{BsdfContext, BsdfFeatures};
 pub use self::label::bsdf_label;
 use self::lobes::{CosineLobes, reflection_probability, refraction_scale};
 pub use self::parameters::{Bsdf, GltfFactors, bsdf_gltf};
+pub(crate) use self::parameters::{classic_flags, conductor_flag};
 use super::choice::choose_first;
 use super::ggx::{ggx_d, ggx_g1, ggx_g2, ggx_sample_visible, ggx_visible_pdf};
+use super::microfacets::{beckmann_sample, cosine_lobe_exponent, cosine_lobe_sample};
 use super::phong::{phong_eval, phong_exponent, phong_pdf, phong_sample};
 use super::warp::{cosine_hemisphere_pdf, square_to_cosine_hemisphere};
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -51,6 +53,22 @@ pub const LOBE_ALL: u32 = constants::LOBE_ALL;
 pub const BSDF_THIN: u32 = constants::BSDF_THIN;
 /// The metal is `conductor_eta` + i `conductor_k`, not `base_color`.
 pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
+/// The metal is a conductor of normal reflectance `conductor_eta` by Schlick's curve.
+pub const BSDF_SCHLICK_CONDUCTOR: u32 = constants::BSDF_SCHLICK_CONDUCTOR;
+/// The same less a term of coefficient `conductor_k` and exponent `conductor_average`.
+pub const BSDF_COMPENSATED_CONDUCTOR: u32 = constants::BSDF_COMPENSATED_CONDUCTOR;
+/// The same less a term of coefficient `conductor_k` and exponent 6.
+pub const BSDF_TINTED_CONDUCTOR: u32 = constants::BSDF_TINTED_CONDUCTOR;
+/// The metal is `conductor_eta` + i `conductor_k` by the simplified factor.
+pub const BSDF_SIMPLIFIED_CONDUCTOR: u32 = constants::BSDF_SIMPLIFIED_CONDUCTOR;
+/// The metal's microfacets are not GGX's under Smith's masking; with the next three bits it says which they are.
+pub const BSDF_CLASSIC: u32 = constants::BSDF_CLASSIC;
+/// Beckmann's distribution.
+pub const BSDF_BECKMANN: u32 = constants::BSDF_BECKMANN;
+/// A power of the cosine.
+pub const BSDF_COSINE_LOBE: u32 = constants::BSDF_COSINE_LOBE;
+/// The simplified geometric term in place of Cook and Torrance's.
+pub const BSDF_SIMPLIFIED_G: u32 = constants::BSDF_SIMPLIFIED_G;
 /// ωo is where particles come from: refraction is not scaled by 1/η².
 pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
 /// The metal is a modified Phong lobe of constant reflectance `base_color`, of the exponent that `alpha` stands for
@@ -148,6 +166,15 @@ impl BsdfContext<'_> {
             }
             return (value, pdf);
         }
+        if self.is_classic(b) {
+            if reflected {
+                let (classic, density) = self.classic_eval(b, wo, wi);
+                let shown = lobe_allowed(part, LOBE_GLOSSY & LOBE_REFLECTION);
+                value += if shown { self.metallic(b) * classic } else { DVec3::ZERO };
+                pdf += (1.0 - p_cosine) * density;
+            }
+            return (value, pdf);
+        }
         let f = &self.features;
         let microfacets = f.metal || f.specular_layer || f.transmission;
         if !microfacets || b.is_delta() || !(reflected || self.transmission(b) > 0.0) {
@@ -214,6 +241,17 @@ pub fn bsdf_pdf(context: &BsdfContext, b: &Bsdf, wo: DVec3, wi: DVec3, mask: u32
     bsdf_eval_pdf(context, b, wo, wi, mask).1
 }
 
+/// A normal of a classical metal: of GGX one that is visible, of others one by their density times their cosine.
+fn classic_sample(b: &Bsdf, wo: DVec3, u: DVec2) -> DVec3 {
+    if b.flags & BSDF_BECKMANN != 0 {
+        beckmann_sample(b.alpha, u)
+    } else if b.flags & BSDF_COSINE_LOBE != 0 {
+        cosine_lobe_sample(cosine_lobe_exponent(b.alpha), u)
+    } else {
+        ggx_sample_visible(wo, b.alpha, u)
+    }
+}
+
 /// A direction in proportion to the allowed lobes: `u.xy` choose the lobe and the direction, `u.z` between the two sides of a rough
 /// microfacet.
 ///
@@ -236,6 +274,10 @@ pub fn bsdf_sample(context: &BsdfContext, b: &Bsdf, wo: DVec3, u: DVec3, mask: u
         flags = LOBE_DIFFUSE & LOBE_REFLECTION;
     } else if context.is_phong(b) && !b.is_delta() {
         wi = phong_sample(phong_exponent(b.alpha), wo, uv);
+        flags = LOBE_GLOSSY & LOBE_REFLECTION;
+    } else if context.is_classic(b) {
+        let h = classic_sample(b, wo, uv);
+        wi = 2.0 * wo.dot(h) * h - wo;
         flags = LOBE_GLOSSY & LOBE_REFLECTION;
     } else {
         let delta = b.is_delta();

@@ -2,9 +2,14 @@
 
 use glam::DVec3;
 
-use super::{BSDF_CONDUCTOR, BSDF_PHONG, BSDF_THIN, ETA_MATCHED};
-use crate::scene::{ConductorIor, Material};
-use crate::transport::fresnel::{fresnel_conductor_average, fresnel_f0};
+use super::{
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_PHONG,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_THIN, BSDF_TINTED_CONDUCTOR,
+    ETA_MATCHED,
+};
+use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets};
+use crate::transport::fresnel::form::MetalFresnel;
+use crate::transport::fresnel::fresnel_f0;
 use crate::transport::ggx::ALPHA_MIN;
 
 /// What the scattering function depends on, at one point of a surface.
@@ -18,20 +23,45 @@ pub struct Bsdf {
     pub specular_f0: DVec3,
     /// Strength of the layer.
     pub specular: f64,
-    /// Real part of the conductor's index.
+    /// Real part of the conductor's index, or its normal reflectance: the first of [`MetalFresnel::parameters`].
     pub conductor_eta: DVec3,
     /// GGX width, which stands for the exponent of a Phong lobe too; a mirror below [`ALPHA_MIN`].
     pub alpha: f64,
-    /// Imaginary part of the conductor's index.
+    /// Imaginary part of the conductor's index, or a coefficient: the second of them.
     pub conductor_k: DVec3,
     /// Share of transmission below the layer.
     pub transmission: f64,
-    /// [`fresnel_conductor_average`] of the conductor.
+    /// Cosine-weighted average of the conductor's factor, or an exponent: the third of them.
     pub conductor_average: DVec3,
     /// Index inside ÷ outside; 0 stands for Schlick's factor.
     pub eta: f64,
     /// `BSDF_…` bits.
     pub flags: u32,
+}
+
+/// The bit of [`Bsdf::flags`] that says which form of Fresnel factor a conductor has.
+pub(crate) fn conductor_flag(fresnel: &MetalFresnel) -> u32 {
+    match fresnel {
+        MetalFresnel::Exact { .. } => BSDF_CONDUCTOR,
+        MetalFresnel::Schlick { .. } => BSDF_SCHLICK_CONDUCTOR,
+        MetalFresnel::Compensated { .. } => BSDF_COMPENSATED_CONDUCTOR,
+        MetalFresnel::Tinted { .. } => BSDF_TINTED_CONDUCTOR,
+        MetalFresnel::Simplified { .. } => BSDF_SIMPLIFIED_CONDUCTOR,
+    }
+}
+
+/// The bits of [`Bsdf::flags`] for classical microfacets.
+pub(crate) fn classic_flags(microfacets: Microfacets) -> u32 {
+    let distribution = match microfacets.distribution {
+        Distribution::Ggx => 0,
+        Distribution::Beckmann => BSDF_BECKMANN,
+        Distribution::CosineLobe => BSDF_COSINE_LOBE,
+    };
+    let geometry = match microfacets.geometry {
+        Geometry::CookTorrance => 0,
+        Geometry::Simplified => BSDF_SIMPLIFIED_G,
+    };
+    BSDF_CLASSIC | distribution | geometry
 }
 
 /// The factors of a glTF material with its `KHR_materials_*` extensions.
@@ -95,8 +125,19 @@ impl Bsdf {
             specular_color: m.specular_color.as_dvec3(),
             thickness: m.thickness.into(),
         });
-        let base = m.conductor.map_or(base, |c| base.with_conductor(&c));
+        let base = m.conductor.map_or(base, |c| base.with_conductor_form(&c, m.fresnel));
+        let base = m
+            .microfacets
+            .map_or(base, |microfacets| base.with_microfacets(microfacets));
         if m.phong { base.with_phong() } else { base }
+    }
+
+    /// The same with classical microfacets of its metal.
+    pub fn with_microfacets(self, microfacets: Microfacets) -> Self {
+        Self {
+            flags: self.flags | classic_flags(microfacets),
+            ..self
+        }
     }
 
     /// The same with a modified Phong lobe as its metal.
@@ -109,12 +150,18 @@ impl Bsdf {
 
     /// The same with an exact conductor as its metal.
     pub fn with_conductor(self, ior: &ConductorIor) -> Self {
-        let (eta, k) = (ior.eta.as_dvec3(), ior.k.as_dvec3());
+        self.with_conductor_form(ior, FresnelForm::Exact)
+    }
+
+    /// The same with a conductor as its metal, whose Fresnel factor has this form.
+    pub fn with_conductor_form(self, ior: &ConductorIor, form: FresnelForm) -> Self {
+        let fresnel = MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3());
+        let [conductor_eta, conductor_k, conductor_average] = fresnel.parameters();
         Self {
-            conductor_eta: eta,
-            conductor_k: k,
-            conductor_average: fresnel_conductor_average(eta, k),
-            flags: self.flags | BSDF_CONDUCTOR,
+            conductor_eta,
+            conductor_k,
+            conductor_average,
+            flags: self.flags | conductor_flag(&fresnel),
             ..self
         }
     }

@@ -8,9 +8,10 @@ use std::f64::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use super::*;
-use crate::scene::{ConductorIor, Material, phong_roughness};
+use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets, phong_roughness};
 use crate::test_random::Random;
-use crate::transport::albedo::{AlbedoTable, albedo_lookup, integrate_albedos};
+use crate::transport::albedo::{AlbedoTable, albedo_average, albedo_lookup, integrate_albedos};
+use crate::transport::fresnel::form::MetalFresnel;
 use crate::transport::fresnel::{fresnel_dielectric, fresnel_schlick};
 use crate::transport::ggx::{ALPHA_MIN, ggx_stretched_cos};
 use crate::transport::random::{Sampler, SamplerKind, sample_1d, sample_2d};
@@ -46,6 +47,25 @@ const WHITE: GltfFactors = GltfFactors {
 fn direction(cos_theta: f64, phi: f64) -> DVec3 {
     let r = (1.0 - cos_theta * cos_theta).sqrt();
     DVec3::new(r * phi.cos(), r * phi.sin(), cos_theta)
+}
+
+/// Every pairing of a distribution with a geometric term.
+fn classical() -> [(&'static str, Microfacets); 6] {
+    let of = |distribution, geometry| Microfacets { distribution, geometry };
+    [
+        ("GGX, Cook and Torrance", of(Distribution::Ggx, Geometry::CookTorrance)),
+        ("GGX, simplified", of(Distribution::Ggx, Geometry::Simplified)),
+        (
+            "Beckmann, Cook and Torrance",
+            of(Distribution::Beckmann, Geometry::CookTorrance),
+        ),
+        ("Beckmann, simplified", of(Distribution::Beckmann, Geometry::Simplified)),
+        (
+            "lobe, Cook and Torrance",
+            of(Distribution::CosineLobe, Geometry::CookTorrance),
+        ),
+        ("lobe, simplified", of(Distribution::CosineLobe, Geometry::Simplified)),
+    ]
 }
 
 /// One of each kind, smooth and rough.
@@ -98,6 +118,14 @@ fn zoo() -> Vec<(&'static str, Bsdf)> {
         };
         all.push(("phong on lambert", bsdf_gltf(&half).with_phong()));
         all.push(("gold", bsdf_gltf(&metal).with_conductor(&gold)));
+        for form in [FresnelForm::Rescaled, FresnelForm::Hoffman, FresnelForm::Simplified] {
+            all.push((form.name(), bsdf_gltf(&metal).with_conductor_form(&gold, form)));
+        }
+        let compensated = bsdf_gltf(&metal).with_conductor_form(&gold, FresnelForm::Compensated);
+        all.push(("compensated", compensated));
+        for (name, microfacets) in classical() {
+            all.push((name, bsdf_gltf(&metal).with_microfacets(microfacets)));
+        }
         all.push(("thin", bsdf_gltf(&clear)));
         all.push((
             "solid",
@@ -166,6 +194,97 @@ fn specular_zero_is_exactly_lambert() {
             let s = bsdf_sample(&c, &b, wo, u, LOBE_ALL);
             assert!((s.weight - b.base_color).abs().max_element() < 1e-15);
             assert_eq!(s.flags, LOBE_DIFFUSE & LOBE_REFLECTION);
+        }
+    }
+}
+
+/// White metals of classical microfacets: their product, and no more light than comes in.
+#[test]
+fn classical_metals_are_the_product_of_their_parts() {
+    use crate::transport::ggx::ggx_d;
+    use crate::transport::microfacets::{beckmann_d, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, kelemen_g};
+    for (name, microfacets) in classical() {
+        for alpha in [0.1f64, 0.4, 1.0] {
+            let material = Material {
+                roughness: alpha.sqrt() as f32,
+                microfacets: Some(microfacets),
+                ..Material::mirror("white", Vec3::ONE)
+            };
+            let b = Bsdf::from_material(&material);
+            let features = BsdfFeatures::of_materials([&material]);
+            assert!(features.classic_microfacets && !features.multiple_scattering);
+            let c = context(features);
+            for i in 0..300 {
+                let [wo, wi] = [41, 42].map(|seed| {
+                    let w = square_to_sphere(random3(i, seed).truncate());
+                    w.with_z(w.z.abs().max(1e-3)).normalize()
+                });
+                let h = (wo + wi).normalize();
+                let d = match microfacets.distribution {
+                    Distribution::Ggx => ggx_d(h, b.alpha),
+                    Distribution::Beckmann => beckmann_d(h, b.alpha),
+                    Distribution::CosineLobe => cosine_lobe_d(h, cosine_lobe_exponent(b.alpha)),
+                };
+                let g = match microfacets.geometry {
+                    Geometry::CookTorrance => cook_torrance_g(wi, wo, h),
+                    Geometry::Simplified => kelemen_g(wi, h),
+                };
+                let (f, _) = bsdf_eval_pdf(&c, &b, wo, wi, LOBE_ALL);
+                assert!((f.x - d * g * wi.z).abs() <= 1e-9 * f.x, "{name}: {f} {d} {g}");
+            }
+            for cos_o in [1.0, 0.5, 0.2, 0.05] {
+                let (leaves, error) = albedo(&c, &b, direction(cos_o, 0.3), LOBE_ALL, 8192);
+                assert!(
+                    leaves.x <= 1.0 + 4.0 * error + 1e-3,
+                    "{name}, {alpha}, {cos_o}: {leaves}"
+                );
+            }
+        }
+    }
+}
+
+/// A perfect mirror under an even light returns its Fresnel factor, in the form that the material names, and only that form is compiled.
+#[test]
+fn metals_reflect_by_the_form_they_name() {
+    let ior = ConductorIor {
+        eta: Vec3::new(1.9, 1.0, 0.58),
+        k: Vec3::new(8.1, 6.6, 5.3),
+    };
+    for form in FresnelForm::ALL {
+        let material = Material {
+            conductor: Some(ior),
+            fresnel: form,
+            ..Material::mirror("mirror", Vec3::ONE)
+        };
+        let features = BsdfFeatures::of_materials([&material]);
+        let compiled = [
+            features.conductor,
+            features.schlick_conductor,
+            features.compensated_conductor,
+            features.tinted_conductor,
+            features.simplified_conductor,
+        ];
+        assert_eq!(compiled.iter().filter(|on| **on).count(), 1, "{form}: {compiled:?}");
+        assert_eq!(features.conductor, form == FresnelForm::Exact);
+        let b = Bsdf::from_material(&material);
+        let fresnel = MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3());
+        for c in [context(features), context(BsdfFeatures::ALL)] {
+            for i in 1..=100 {
+                let wo = direction(f64::from(i) / 100.0, 0.7);
+                let s = bsdf_sample(&c, &b, wo, random3(i, 31), LOBE_ALL);
+                assert_eq!(s.weight, fresnel.at(wo.z), "{form}, {wo}");
+            }
+            // Rough metals are compensated with the average of the same form.
+            let rough = Bsdf { alpha: 0.5, ..b };
+            let lobes = c.cosine_lobes(&rough, 0.5, false, LOBE_ALL);
+            let loss = 1.0 - albedo_average(c.table, 0, 0.5);
+            let f = fresnel.average();
+            let expected = f * f * (1.0 - loss) / (DVec3::ONE - f * loss) * (1.0 - albedo_lookup(c.table, 0, 0.5, 0.5));
+            assert!(
+                (lobes.metal - expected).abs().max_element() < 1e-12,
+                "{form}: {}",
+                lobes.metal
+            );
         }
     }
 }

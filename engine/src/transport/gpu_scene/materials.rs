@@ -2,12 +2,14 @@
 
 use super::textures::Textures;
 use crate::gpu::shaders::constants::{
-    MATERIAL_BLEND, MATERIAL_BOUNDARY, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_PHONG,
-    MATERIAL_UNLIT,
+    MATERIAL_BLEND, MATERIAL_BOUNDARY, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_FORM_SHIFT, MATERIAL_MASK,
+    MATERIAL_PHONG, MATERIAL_UNLIT,
 };
 use crate::gpu::shaders::types::SceneMaterial;
 use crate::scene::{AlphaMode, Material, Scene};
-use crate::transport::fresnel::fresnel_conductor_average;
+use crate::transport::bsdf::{classic_flags, conductor_flag};
+use crate::transport::fresnel::form::MetalFresnel;
+use glam::DVec3;
 
 /// All materials with whether some instance places them; last the default one, for meshes that have none.
 pub(super) fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> Vec<(&'a Material, bool)> {
@@ -21,7 +23,15 @@ pub(super) fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> V
 
 /// A material as the kernels read it; its textures join the others.
 pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Material) -> SceneMaterial {
-    let conductor = m.conductor;
+    let fresnel = m
+        .conductor
+        .map(|c| MetalFresnel::new(m.fresnel, c.eta.as_dvec3(), c.k.as_dvec3()));
+    let exact = matches!(fresnel, Some(MetalFresnel::Exact { .. }));
+    let microfacets = m.microfacets.map_or(0, classic_flags) << MATERIAL_FORM_SHIFT;
+    let form = fresnel.as_ref().filter(|_| !exact).map_or(0, conductor_flag) << MATERIAL_FORM_SHIFT;
+    let [conductor_eta, conductor_k, conductor_average] = fresnel
+        .map_or([DVec3::ONE, DVec3::ZERO, DVec3::ZERO], |fresnel| fresnel.parameters())
+        .map(|v| v.as_vec3().to_array());
     let flag = |on: bool, bit| if on { bit } else { 0 };
     let (cutoff, alpha_flag) = match m.alpha_mode {
         AlphaMode::Opaque => (0.0, 0),
@@ -42,15 +52,11 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         metallic: m.metallic,
         specular_color: m.specular_color.to_array(),
         roughness: m.roughness,
-        conductor_eta: conductor.map_or([1.0; 3], |c| c.eta.to_array()),
+        conductor_eta,
         transmission: m.transmission,
-        conductor_k: conductor.map_or([0.0; 3], |c| c.k.to_array()),
+        conductor_k,
         ior: m.ior,
-        conductor_average: conductor.map_or([0.0; 3], |c| {
-            fresnel_conductor_average(c.eta.as_dvec3(), c.k.as_dvec3())
-                .as_vec3()
-                .to_array()
-        }),
+        conductor_average,
         specular: m.specular,
         absorption: absorption.as_vec3().to_array(),
         thickness: m.thickness,
@@ -58,7 +64,9 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         normal_scale: m.normal_scale,
         flags: flag(m.double_sided, MATERIAL_DOUBLE_SIDED)
             | flag(m.unlit, MATERIAL_UNLIT)
-            | flag(conductor.is_some(), MATERIAL_CONDUCTOR)
+            | flag(exact, MATERIAL_CONDUCTOR)
+            | form
+            | microfacets
             | flag(m.phong, MATERIAL_PHONG)
             | flag(m.boundary, MATERIAL_BOUNDARY)
             | alpha_flag,

@@ -105,6 +105,9 @@ measures! {
     on_device "cycles" rendering::cycles;
     on_device "device-model" device::device_model;
     on_host "free-flight" media::free_flight;
+    on_device "fresnel-cost" surfaces::fresnel_cost;
+    on_device "fresnel-forms" surfaces::fresnel_forms;
+    on_host "fresnel-seam" surfaces::fresnel_seam;
     on_host "fuzzing" files::fuzzing;
     on_device "kd-caches" kd::kd_caches.of_any_scenes();
     on_device "kd-heuristics" kd::kd_heuristics.of_any_scenes();

@@ -5,6 +5,10 @@
 pub mod alpha;
 pub mod coupled_reflection;
 pub mod energy;
+pub mod fresnel_cost;
+pub mod fresnel_forms;
+pub mod fresnel_seam;
 pub mod multiple_scattering;
+pub mod published_metals;
 pub mod shading_normals;
 pub mod tangents;
