@@ -1,10 +1,11 @@
 //! `clerestory metal`: a metal's reflectance, and what cheaper forms of its Fresnel factor lose and cost.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::film::png;
+use clerestory::input::read_text;
 use clerestory::scene::metals::{self, IndexSpectrum, artistic::artistic_parameters};
 use clerestory::scene::{ConductorIor, FresnelForm};
 use clerestory::transport::fresnel::compensated::compensation;
@@ -171,20 +172,12 @@ fn spectrum(metal: &str) -> Outcome<IndexSpectrum> {
         return Ok(spectrum);
     }
     let known: Vec<&str> = metals::names().collect();
-    let failed = |cause: String| {
-        let message = format!("{metal}: {cause}");
-        Failure {
-            hint: Some(format!("metals with a name: {}", known.join(", "))),
-            ..Failure::usage(message)
-        }
+    let failed = |message: String| Failure {
+        hint: Some(format!("metals with a name: {}", known.join(", "))),
+        ..Failure::usage(message)
     };
-    let path = std::path::Path::new(metal);
-    let about = std::fs::metadata(path).map_err(|error| failed(error.to_string()))?;
-    if !about.is_file() || about.len() > FILE_MAX {
-        return Err(failed("is not a regular file of at most 16 MiB".into()));
-    }
-    let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
-    IndexSpectrum::parse(&text).map_err(failed)
+    let text = read_text(Path::new(metal), FILE_MAX).map_err(|error| failed(error.to_string()))?;
+    IndexSpectrum::parse(&text).map_err(|cause| failed(format!("{metal}: {cause}")))
 }
 
 fn of_band(ior: &ConductorIor, i: usize, band: &'static str) -> Band {
