@@ -5,10 +5,13 @@
 
 use std::f64::consts::PI;
 
-use clerestory::scene::{Environment, LightKind, Material, Mesh, Scene};
+use clerestory::scene::{
+    Distribution, Environment, FresnelForm, Geometry, LightKind, Material, Mesh, Microfacets, Scene, metals,
+};
 use clerestory::techniques::PathTracerSettings;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, LOBE_ALL, bsdf_sample};
+use clerestory::transport::fresnel::form::MetalFresnel;
 use clerestory::transport::phong::phong_eval;
 use clerestory::transport::warp::square_to_cosine_hemisphere;
 use clerestory_hard_cases::scenes::orthographic;
@@ -515,6 +518,68 @@ fn phong_floors_under_a_sky_have_their_albedo() {
                 .map(|rho| f64::from(rho) * (f64::from(share) * lobe + 1.0 - f64::from(share)));
             let picture = render(gpu, &scene, SMALL, 512, &independent());
             picture.expect_uniform(&format!("cosine {cosine}"), albedo, 0.0);
+        }
+    });
+}
+
+/// A smooth metal floor under a uniform sky shows its Fresnel factor, in the form that the material names; a rough one of classical microfacets the albedo
+/// that the f64 twin has.
+#[test]
+fn metal_floors_under_a_sky_reflect_by_the_form_they_name() {
+    with_gpu(|gpu| {
+        let copper = metals::by_name("copper").expect("metal");
+        let cosine = 0.15f64;
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let floor_of = |material: Material| {
+            let mut scene = lambert_floor();
+            scene.materials[0] = Material {
+                conductor: Some(copper),
+                ..material
+            };
+            scene.environment = Some(Environment::uniform(Vec3::ONE));
+            scene.cameras[0] = orthographic(10.0 * DVec3::new(sine, cosine, 0.0), DVec3::ZERO, DVec3::Z, 0.2);
+            scene
+        };
+        let mut shown: Vec<DVec3> = Vec::new();
+        for fresnel in FresnelForm::ALL {
+            let scene = floor_of(Material {
+                fresnel,
+                ..Material::mirror("floor", Vec3::ONE)
+            });
+            let expected = MetalFresnel::new(fresnel, copper.eta.as_dvec3(), copper.k.as_dvec3()).at(cosine);
+            let picture = render(gpu, &scene, SMALL, 4, &independent());
+            picture.expect_uniform(fresnel.name(), expected.to_array(), 1e-5);
+            shown.push(expected);
+        }
+        // They can be told apart, but for the two that are matched at one place.
+        let least = shown[1..4]
+            .iter()
+            .map(|f| (*f - shown[0]).abs().max_element())
+            .fold(1.0, f64::min);
+        assert!(least > 1e-4, "{shown:?}");
+        for (distribution, geometry) in [
+            (Distribution::Ggx, Geometry::Simplified),
+            (Distribution::Beckmann, Geometry::CookTorrance),
+            (Distribution::CosineLobe, Geometry::Simplified),
+        ] {
+            let scene = floor_of(Material {
+                roughness: 0.6,
+                microfacets: Some(Microfacets { distribution, geometry }),
+                ..Material::mirror("floor", Vec3::ONE)
+            });
+            let b = Bsdf::from_material(&scene.materials[0]);
+            let context = BsdfContext {
+                features: BsdfFeatures::ALL,
+                table: AlbedoTable::shared(),
+            };
+            let (n, mut albedo) = (512u32, DVec3::ZERO);
+            for i in 0..n * n {
+                let u = (DVec2::new(f64::from(i % n), f64::from(i / n)) + 0.5) / f64::from(n);
+                let sample = bsdf_sample(&context, &b, DVec3::new(sine, 0.0, cosine), u.extend(0.5), LOBE_ALL);
+                albedo += sample.weight / f64::from(n * n);
+            }
+            let picture = render(gpu, &scene, SMALL, 512, &independent());
+            picture.expect_uniform(&format!("{distribution:?}, {geometry:?}"), albedo.to_array(), 1e-3);
         }
     });
 }

@@ -125,7 +125,6 @@ const ROW: Row = Row {
         "tests/tests/twins/fresnel_forms.rs::microfacets_agree_with_their_twins",
         "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
     ],
-    experiment: "clerestory metal gold",
     api: &["clerestory::transport::microfacets"],
     settings: &["clerestory::scene::Microfacets"],
     ..Row::of(file!())

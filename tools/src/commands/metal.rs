@@ -1,10 +1,11 @@
 //! `clerestory metal`: a metal's reflectance, and what cheaper forms of its Fresnel factor lose and cost.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::film::png;
+use clerestory::input::read_text;
 use clerestory::scene::metals::{self, IndexSpectrum, artistic::artistic_parameters};
 use clerestory::scene::{ConductorIor, FresnelForm};
 use clerestory::transport::fresnel::compensated::compensation;
@@ -36,8 +37,8 @@ pub struct Arguments {
     /// A metal's name, or a file with its spectrum
     metal: String,
     /// Three wavelengths, in nanometres, in the place of the means over the red, green and blue channels
-    #[arg(long, value_name = "R,G,B", value_delimiter = ',', num_args = 3)]
-    wavelengths: Option<Vec<f64>>,
+    #[arg(long, value_name = "R,G,B", value_parser = wavelengths)]
+    wavelengths: Option<[f64; 3]>,
     /// Also times each form on the device
     #[arg(long)]
     cost: bool,
@@ -71,6 +72,13 @@ const FILE_MAX: u64 = 1 << 24;
 fn form(text: &str) -> Result<FresnelForm, String> {
     let found = FresnelForm::ALL.into_iter().find(|form| form.name() == text);
     found.ok_or_else(|| format!("known: {}", FresnelForm::ALL.map(FresnelForm::name).join(", ")))
+}
+
+fn wavelengths(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
+    let three = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    let sound = three.filter(|all| all.iter().all(|w| w.is_finite() && *w > 0.0));
+    sound.ok_or_else(|| "needs three numbers above 0, in nanometres, with commas between".into())
 }
 
 /// A band of a metal.
@@ -125,13 +133,8 @@ struct Shown {
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     let spectrum = spectrum(&arguments.metal)?;
-    let ior = match arguments.wavelengths.as_deref() {
-        Some(&[r, g, b]) if [r, g, b].iter().all(|w| w.is_finite() && *w > 0.0) => spectrum.at_wavelengths([r, g, b]),
-        Some(_) => {
-            return Err(Failure::usage(
-                "--wavelengths takes three numbers above 0, in nanometres",
-            ));
-        }
+    let ior = match arguments.wavelengths {
+        Some(wavelengths) => spectrum.at_wavelengths(wavelengths),
         None => spectrum.channels(),
     };
     let shown = Shown {
@@ -169,20 +172,12 @@ fn spectrum(metal: &str) -> Outcome<IndexSpectrum> {
         return Ok(spectrum);
     }
     let known: Vec<&str> = metals::names().collect();
-    let failed = |cause: String| {
-        let message = format!("{metal}: {cause}");
-        Failure {
-            hint: Some(format!("metals with a name: {}", known.join(", "))),
-            ..Failure::usage(message)
-        }
+    let failed = |message: String| Failure {
+        hint: Some(format!("metals with a name: {}", known.join(", "))),
+        ..Failure::usage(message)
     };
-    let path = std::path::Path::new(metal);
-    let about = std::fs::metadata(path).map_err(|error| failed(error.to_string()))?;
-    if !about.is_file() || about.len() > FILE_MAX {
-        return Err(failed("is not a regular file of at most 16 MiB".into()));
-    }
-    let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
-    IndexSpectrum::parse(&text).map_err(failed)
+    let text = read_text(Path::new(metal), FILE_MAX).map_err(|error| failed(error.to_string()))?;
+    IndexSpectrum::parse(&text).map_err(|cause| failed(format!("{metal}: {cause}")))
 }
 
 fn of_band(ior: &ConductorIor, i: usize, band: &'static str) -> Band {

@@ -614,6 +614,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Says what glTF cannot; geometry and textures stay in the model.",
     tests: &[
         "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
+        "engine/tests/scene_load.rs::metals_are_named_measured_or_coloured_and_name_their_form",
         "engine/tests/scene_load.rs::modified_phong_surfaces_are_loaded_and_checked",
         "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
     ],

@@ -133,6 +133,7 @@ measures! {
     on_device "map-quality" photon_maps::map_quality;
     on_device "map-rendering" maps::map_rendering;
     on_host "merge-example" photon_maps::merge_example;
+    on_host "microfacet-parts" surfaces::microfacet_parts;
     on_device "mitsuba" rendering::mitsuba;
     on_host "multiple-scattering" surfaces::multiple_scattering;
     on_device "parallel-blocks" device::parallel_blocks;

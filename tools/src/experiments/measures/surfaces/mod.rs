@@ -8,6 +8,7 @@ pub mod energy;
 pub mod fresnel_cost;
 pub mod fresnel_forms;
 pub mod fresnel_seam;
+pub mod microfacet_parts;
 pub mod multiple_scattering;
 pub mod published_metals;
 pub mod shading_normals;
