@@ -186,11 +186,8 @@ impl BsdfContext<'_> {
             diffuse = opaque * b.base_color * self.layer_loss(b, cos_o);
         }
         let mut metal = DVec3::ZERO;
-        let compensated = self.features.metal
-            && self.features.multiple_scattering
-            && !b.is_delta()
-            && !self.is_phong(b)
-            && !self.is_classic(b);
+        let microfacets = !b.is_delta() && !self.is_phong(b) && !self.is_classic(b);
+        let compensated = self.features.metal && self.features.multiple_scattering && microfacets;
         if compensated && lobe_allowed(mask, LOBE_GLOSSY & LOBE_REFLECTION) {
             let e_average = albedo_average(self.table, 0, b.alpha);
             let loss = 1.0 - e_average;
