@@ -22,7 +22,7 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Table { vec4 curve_table[]; };
-layout(set = 0, binding = 1, scalar) restrict writeonly buffer Values { vec3 curve_values[]; };
+layout(set = 0, binding = 1, scalar) restrict writeonly buffer Values { float curve_values[]; };  // three an invocation
 
 vec4 fresnel_table(uint index) { return curve_table[index]; }
 
@@ -73,5 +73,7 @@ void main() {
         c = fract(c + CURVE_STEP * (value.x + value.y + value.z));
         value = curve_at(c);
     }
-    curve_values[i] = value;
+    for (uint band = 0u; band < 3u; ++band) {
+        curve_values[3u * i + band] = value[band];
+    }
 }

@@ -846,7 +846,7 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
         "scales",
         "breaks",
         "expects",
-        "path (sobol), path (pcg), photon, ",
+        "path (sobol), path (pcg), path (joint-sobol), photon, ",
         ", bvh2, lbvh, lbvh-high, kd, wide",
         "degrades",
     ] {

@@ -141,7 +141,7 @@ fn duck() -> String {
 }
 
 /// Each command that writes, with each of its own inputs as output, or with a file there that is not the program's.
-const REFUSED: [(&str, &str); 48] = [
+const REFUSED: [(&str, &str); 50] = [
     ("render --spp 1 --reference a.exr -o a.exr", "reads it"),
     ("render --spp 1 --reference a.exr -o a.exr --overwrite", "reads it"),
     ("render --size 4 --spp 1 --reference c.png -o c.exr", "reads it"),
@@ -224,6 +224,8 @@ const REFUSED: [(&str, &str); 48] = [
     ("bench --sort --scene tables/sort.json --folder tables", "reads it"),
     ("bench --sort --scene own/index.md --page own/index.md", "reads it"),
     ("bench --sort --page protected.md", "write-protected"),
+    ("metal own/index.md --sphere own/index.md", "reads it"),
+    ("metal gold --sphere protected.md", "write-protected"),
 ];
 
 /// Commands that go on where the place for what they would keep is one of their inputs.

@@ -34,13 +34,13 @@ const FREE_SECONDS: f64 = 2.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
 const HOPELESS: f64 = 2.0;
 
-/// Seconds that pilots may still take, of `part` of what they may take in all, beside a picture that takes between `least` and `most` seconds: `spent`
-/// seconds have gone by, and `rounds` of them were taken by rounds.
-fn room(part: f64, goal: Goal, [least, most]: [f64; 2], spent: f64, rounds: f64) -> f64 {
+/// Seconds that pilots may still take, of `part` of what they may take in all, beside a picture that takes `expected` seconds, and at least `least`:
+/// `spent` seconds have gone by, and `rounds` of them were taken by rounds.
+fn room(part: f64, goal: Goal, [least, expected]: [f64; 2], spent: f64, rounds: f64) -> f64 {
     match goal.time {
         Some(time) => part * PILOT_SHARE * time.as_secs_f64() - spent,
         // Whatever the picture takes, pilots are within their share, or both are not long.
-        None if most + FREE_SECONDS > LONG => {
+        None if expected + FREE_SECONDS > LONG => {
             part * (PILOT_SHARE / (1.0 - PILOT_SHARE) * least).max(PILOT_SHARE * LONG) - spent
         }
         None => part * FREE_SECONDS - rounds,
@@ -120,7 +120,9 @@ pub fn run_rounds(
         let able = || trials.iter().flatten().filter(|trial| trial.can_be_chosen());
         let best = able().map(&cost).fold(f64::INFINITY, f64::min);
         let picture = able().map(|trial| trial.picture_seconds(goal, spent));
-        let picture = picture.fold([f64::INFINITY; 2], |[a, b], [least, most]| [a.min(least), b.min(most)]);
+        let picture = picture.fold([f64::INFINITY; 2], |[a, b], [least, expected]| {
+            [a.min(least), b.min(expected)]
+        });
         let rounds = seconds_of_rounds(trials);
         let allowed = room(ROUNDS_SHARE, goal, picture, spent, rounds);
         let blind = goal.time.is_none() && trials.iter().flatten().all(|trial| !trial.lit);

@@ -402,14 +402,15 @@ impl<'a> Trial<'a> {
         (1.0 + left / each).min(f64::from(u32::MAX)) as u32
     }
 
-    /// Seconds between which the picture for the goal takes in 9 of 10 cases, by how well its error is known, when the pilots have taken `spent` seconds.
+    /// Seconds that the picture for the goal takes at the least, in 19 of 20 cases, by how well its error is known, and those expected, when the pilots
+    /// have taken `spent` seconds.
     pub fn picture_seconds(&self, goal: Goal, spent: f64) -> [f64; 2] {
         let samples = f64::from(self.samples(goal, spent));
         let slack = match goal.error {
             Some(_) if self.lit => self.error.factor_of_samples(samples),
             _ => 1.0,
         };
-        [samples / slack, samples * slack].map(|samples| self.cost.seconds(samples))
+        [samples / slack, samples].map(|samples| self.cost.seconds(samples))
     }
 
     /// Samples per pixel for the goal, when the pilots have taken `spent` seconds.

@@ -132,6 +132,16 @@ struct Shown {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
+    let file = metals::spectrum(&arguments.metal)
+        .is_none()
+        .then(|| PathBuf::from(&arguments.metal));
+    let plan = match &arguments.sphere {
+        Some(path) => {
+            let overwrite = arguments.overwriting.overwrite;
+            Some((path, Outputs::one(path, &Inputs::of(file.iter()), overwrite)?))
+        }
+        None => None,
+    };
     let spectrum = spectrum(&arguments.metal)?;
     let ior = match arguments.wavelengths {
         Some(wavelengths) => spectrum.at_wavelengths(wavelengths),
@@ -153,9 +163,7 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     } else {
         output::print(&shown.text())?;
     }
-    if let Some(path) = &arguments.sphere {
-        let inputs = Inputs::of(std::iter::empty::<&PathBuf>());
-        let plan = Outputs::one(path, &inputs, arguments.overwriting.overwrite)?;
+    if let Some((path, plan)) = plan {
         let [exact, below] = [FresnelForm::Exact, arguments.form]
             .map(|form| MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3()));
         let spheres = DEGREES.map(|degrees| split_sphere(&exact, &below, degrees, SIDE));

@@ -70,8 +70,8 @@ sources! {
     JENSEN_1996 = "jensen-1996": "H. W. Jensen", "Global Illumination using Photon Maps", "EGWR", 1996;
     JENSEN_2001 = "jensen-2001": "H. W. Jensen", "Realistic Image Synthesis Using Photon Mapping", "A K Peters", 2001;
     JENSEN_CHRISTENSEN_1998 = "jensen-christensen-1998": "H. W. Jensen, P. Christensen", "Efficient Simulation of Light Transport in Scenes with Participating Media Using Photon Maps", "SIGGRAPH", 1998;
-    JOHNSON_CHRISTY_1972 = "johnson-christy-1972": "P. B. Johnson, R. W. Christy", "Optical Constants of the Noble Metals", "Phys. Rev. B 6", 1972;
     JOE_KUO_2008 = "joe-kuo-2008": "S. Joe, F. Y. Kuo", "Constructing Sobol Sequences with Better Two-Dimensional Projections", "SIAM J. Sci. Comput. 30", 2008;
+    JOHNSON_CHRISTY_1972 = "johnson-christy-1972": "P. B. Johnson, R. W. Christy", "Optical Constants of the Noble Metals", "Phys. Rev. B 6", 1972;
     JOHNSON_CHRISTY_1974 = "johnson-christy-1974": "P. B. Johnson, R. W. Christy", "Optical Constants of Transition Metals", "Phys. Rev. B 9", 1974;
     JOLDES_2017 = "joldes-2017": "M. Joldes, J.-M. Muller, V. Popescu", "Tight and Rigorous Error Bounds for Basic Building Blocks of Double-Word Arithmetic", "ACM TOMS 44", 2017;
     KAJIYA_1986 = "kajiya-1986": "J. Kajiya", "The Rendering Equation", "SIGGRAPH", 1986;

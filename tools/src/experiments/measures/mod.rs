@@ -186,7 +186,7 @@ mod tests {
 
     /// Criteria for rows that no smoke run has, since they take too long.
     const OF_LONG_RUNS: [&str; 5] = [
-        "pilots take at most a quarter of the time where it is above five seconds: their share",
+        "pilots take at most a quarter of the time of each picture where it is above five seconds: the largest share",
         "95 of 100 footprints of 256 pixels a side are within 5 %: their relative error",
         "the automatic size is within 3 % of the best by time, on scenes that judge it: best / this",
         "it is so on scenes that judge it: time of share 1/8 over that of 1/16, geometric mean",
