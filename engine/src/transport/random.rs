@@ -3,7 +3,7 @@
 //! Method: PCG hashes of Jarzynski and Olano, "Hash Functions for GPU Rendering" (JCGT 9(3), 2020); shuffled and Owen-scrambled
 //! Sobol' (0,2)-sequence padded by slots of two dimensions, Burley, "Practical Hash-based Owen Scrambling" (JCGT 10(4), 2020),
 //! with the hash constants of Vegdahl (2021). Jointly stratified, the first slots of a stream are pairs of one sequence of sixteen dimensions
-//! ([`sobol`]). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
+//! ([`super::sobol`]). Guarantees: a draw is a pure function of (seed, pixel, sample index, dimension);
 //! values lie on the 2⁻²⁴ grid of [0, 1). Twin of `transport/random.glsl`, bit for bit.
 
 use super::sobol::{SOBOL_INDEX_BITS, SOBOL_PAIRS, sobol_pair};
