@@ -18,7 +18,7 @@
 //!   it comes last, and [`Candidate::misses`] and [`Plan::shortfall`] name the lights.
 //!
 //! The predicted error is √(bias² + noise²), with an interval for 9 of 10 pictures ([`Candidate::error_interval`]). Pilots take one first round of each
-//! candidate with the compilation of its kernels, and then two seconds, or a quarter of all time where that may be above five seconds, by the least
+//! candidate with the compilation of its kernels, and then two seconds, or a quarter of all time where both are expected to take above five, by the least
 //! that the picture may take for all that is known, and a last pair of at least a sixteenth of the picture's samples, up to 16; where that pair says that
 //! the picture takes far longer, a longer one follows. First rounds of further settings of a technique are left out where they would exceed it, those of
 //! further techniques only where a time is to be kept. [`Plan::pilot_share`] says what share they took. What they find is the same in every run for as

@@ -88,6 +88,8 @@ pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Re
     let epsilon = relative_mse_epsilon(all.iter().flatten().flatten().map(|value| *value as f32), offset);
     // One truth for all, or one of the others for each.
     let shared = (kind == Truth::Pixel || pairs.len() == 1).then(|| levels_of_pair(&all, width, kind));
+    let mean_of = |[a, b]: &[Vec<f64>; 2]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect() };
+    let means: Vec<Vec<f64>> = all.iter().map(mean_of).collect();
     let estimate = |at: usize| -> Result<NoiseEstimate> {
         let (spp, pair) = pairs[at];
         if let Some(levels) = &shared {
@@ -104,14 +106,10 @@ pub(super) fn noise_of_pairs(pairs: &[Pair<'_>], offset: f64, kind: Truth) -> Re
             .zip(&own)
             .map(|(others, own)| shrunk(others, own, f64::from(spp) / of_others, width))
             .collect();
-        let borne_out: Vec<Vec<f64>> = levels
-            .iter()
-            .zip(&all)
-            .map(|(levels, [a, b])| {
-                let means = a.iter().zip(b).map(|(a, b)| 0.5 * (a + b));
-                levels.iter().zip(means).map(|(level, mean)| level.max(mean)).collect()
-            })
-            .collect();
+        let greater = |(levels, means): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            levels.iter().zip(means).map(|(level, mean)| level.max(*mean)).collect()
+        };
+        let borne_out: Vec<Vec<f64>> = levels.iter().zip(&means).map(greater).collect();
         let found = noise_of_pair(pair, &levels, Some(&borne_out), epsilon, kind)?;
         // Of the mean of both halves of the others, as independent samples have it.
         let noise_of_others = found.relative_mse * f64::from(spp) / (2.0 * of_others);
@@ -448,6 +446,12 @@ mod tests {
         }
     }
 
+    /// Two pictures of each number of samples.
+    fn pairs_of<'a>(pictures: &'a [[Picture; 2]], budgets: &[u32]) -> Vec<Pair<'a>> {
+        let both = pictures.iter().zip(budgets);
+        both.map(|([a, b], spp)| (*spp, [a, b])).collect()
+    }
+
     /// A dark room of 64 × 64 pixels with bright dots of one pixel, one in 16, whose light is met by one sample in four.
     fn with_dots(samples: u32, random: &mut Random) -> Picture {
         let values = (0..64 * 64 * 3).map(|i| {
@@ -465,17 +469,13 @@ mod tests {
         Picture::from_radiance(64, 64, values.collect()).unwrap()
     }
 
-    // The truth of dots that noise hides is theirs, not that of the dark around them: with that the root was found 1.4 times as large.
+    // The truth of dots that noise hides is theirs, not that of the dark around them.
     #[test]
     fn bright_dots_are_related_to_their_own_radiance() {
         let mut random = Random(29);
         let budgets = [4, 16, 64];
         let pictures = budgets.map(|samples| [(); 2].map(|()| with_dots(samples, &mut random)));
-        let pairs: Vec<Pair<'_>> = pictures
-            .iter()
-            .zip(budgets)
-            .map(|([a, b], spp)| (spp, [a, b]))
-            .collect();
+        let pairs = pairs_of(&pictures, &budgets);
         let found = noise_of_pairs(&pairs, 0.01, Truth::Neighbourhood).unwrap();
         let mean = (2.0 + 15.0 * 0.1) / 16.0;
         // Relative variances of a sample: 3 of a dot, a third elsewhere.
@@ -490,8 +490,8 @@ mod tests {
         }
     }
 
-    // Of a dot that one sample in 300 meets, a thousand times as bright as what is around it, the pairs of few samples show nothing: relative to what they show
-    // its noise in the last one was a thousand times all other.
+    // A pixel that one picture of the last pair alone sees, 300 times as bright as all else: relative to what the others show there, its noise would be
+    // two thousand times all other.
     #[test]
     fn one_pixel_that_the_others_have_missed_is_not_all_of_the_error() {
         let mut random = Random(31);
@@ -506,11 +506,7 @@ mod tests {
                 Picture::from_radiance(64, 64, values.collect()).unwrap()
             })
         });
-        let pairs: Vec<Pair<'_>> = pictures
-            .iter()
-            .zip(budgets)
-            .map(|([a, b], spp)| (spp, [a, b]))
-            .collect();
+        let pairs = pairs_of(&pictures, &budgets);
         let found = noise_of_pairs(&pairs, 0.01, Truth::Neighbourhood).unwrap()[1].relative_mse;
         // A third of a sample's square, by 64; the dot is worth 8 at most of 4096.
         let (without, dot) = (1.0 / 3.0 / 64.0, 8.0 / 4096.0);
@@ -525,11 +521,7 @@ mod tests {
             .iter()
             .map(|samples| [(); 2].map(|()| with_a_lamp(32, *samples, &mut random)))
             .collect();
-        let pairs: Vec<Pair<'_>> = pictures
-            .iter()
-            .zip([2, 8, 32])
-            .map(|([a, b], spp)| (spp, [a, b]))
-            .collect();
+        let pairs = pairs_of(&pictures, &[2, 8, 32]);
         let found = noise_of_pairs(&pairs, 0.01, Truth::Neighbourhood).unwrap();
         for pair in found.windows(2) {
             let ratio = pair[0].relative_mse / pair[1].relative_mse;

@@ -39,7 +39,7 @@ const HOPELESS: f64 = 2.0;
 fn room(part: f64, goal: Goal, [least, expected]: [f64; 2], spent: f64, rounds: f64) -> f64 {
     match goal.time {
         Some(time) => part * PILOT_SHARE * time.as_secs_f64() - spent,
-        // Whatever the picture takes, pilots are within their share, or both are not long.
+        // By the least that the picture may take; with one that makes five seconds of both, pilots are within their share, too.
         None if expected + FREE_SECONDS > LONG => {
             part * (PILOT_SHARE / (1.0 - PILOT_SHARE) * least).max(PILOT_SHARE * LONG) - spent
         }
@@ -108,7 +108,7 @@ pub fn run_rounds(
     for (&last, &spp) in ROUNDS.iter().zip(&ROUNDS[1..]) {
         update_judgements(trials, goal)?;
         let spent = start.elapsed().as_secs_f64();
-        let predicted = |trial: &Trial<'_>| trial.cost.seconds(f64::from(trial.samples(goal, spent)));
+        let predicted = |trial: &Trial<'_>| trial.picture_seconds(goal, spent)[1];
         // Under a time alone all take equally long, and the one with the smaller error is the better one.
         let cost = |trial: &Trial<'_>| match goal.error {
             _ if !trial.is_possible(goal) => IMPOSSIBLE_COST,
