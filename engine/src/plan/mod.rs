@@ -18,9 +18,10 @@
 //!   it comes last, and [`Candidate::misses`] and [`Plan::shortfall`] name the lights.
 //!
 //! The predicted error is √(bias² + noise²), with an interval for 9 of 10 pictures ([`Candidate::error_interval`]). Pilots take one first round of each
-//! candidate with the compilation of its kernels, and then two seconds, or a quarter of all time where both are expected to take above five, by the least
-//! that the picture may take for all that is known, and a last pair of at least a sixteenth of the picture's samples, up to 16; where that pair says that
-//! the picture takes far longer, a longer one follows. First rounds of further settings of a technique are left out where they would exceed it, those of
+//! candidate with the compilation of its kernels, and then one second, or a quarter of all time where that is expected to be above five or nearly, by the
+//! least that the picture may take for all that is known, and a last pair of at least a sixteenth of the picture's samples, up to 16; where that pair says
+//! that the picture takes far longer, a longer one follows. First rounds of further settings of a technique are left out where they would exceed their
+//! part of a quarter of all time, or of five seconds where that is more; those of
 //! further techniques only where a time is to be kept. [`Plan::pilot_share`] says what share they took. What they find is the same in every run for as
 //! many rounds; how many there are, and what is predicted to be faster, is the clock's.
 //!
@@ -412,6 +413,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/noise.rs::one_pixel_that_the_others_have_missed_is_not_all_of_the_error",
         "engine/src/plan/noise.rs::pairs_of_one_view_keep_the_ratio_of_their_errors",
         "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",
+        "engine/src/plan/model.rs::pairs_fit_the_time_that_they_take",
         "engine/src/plan/model.rs::slopes_are_believed_alike_to_either_side_of_the_law",
         "engine/src/plan/model.rs::the_last_pair_alone_says_how_large_the_error_is",
         "engine/src/plan/model.rs::neither_stopping_nor_choosing_makes_predictions_optimistic",

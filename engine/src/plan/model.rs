@@ -217,6 +217,7 @@ pub struct BiasModel {
     samples_a_pass: f64,
     /// What it found, and what may be by its noise.
     square: f64,
+    lower: f64,
     upper: f64,
     /// The squared bias falls as passes^(−exponent).
     exponent: f64,
@@ -243,6 +244,7 @@ impl BiasModel {
             at: 1.0,
             samples_a_pass: 1.0,
             square: found.square.max(0.0),
+            lower: found.lower().max(0.0),
             upper: found.upper(),
             exponent: 0.0,
             is_assumed: false,
@@ -304,6 +306,7 @@ impl BiasModel {
             at: to,
             samples_a_pass,
             square: last.square.max(0.0) * left,
+            lower: last.lower().max(0.0) * left,
             upper: last.upper() * left,
             exponent,
             is_assumed: measured.is_none(),
@@ -323,6 +326,11 @@ impl BiasModel {
     /// Relative squared bias expected of that many samples per pixel.
     pub fn square(&self, samples: f64) -> f64 {
         self.square * self.decay(samples)
+    }
+
+    /// What it is at least by the noise of what was measured, as [`upper`](Self::upper).
+    pub fn lower(&self, samples: f64) -> f64 {
+        self.lower * self.decay(samples)
     }
 
     /// What it is at most by the noise of what was measured, but for one case in 40, if the exponent is right: how well that is known does not count.
@@ -388,9 +396,61 @@ impl CostModel {
     }
 }
 
+/// Seconds of pairs of pilots over their samples per pixel.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PairCost {
+    /// Of one pilot, before and with the first sample.
+    pub start: f64,
+    /// Of one pilot, for each further sample.
+    pub sample: f64,
+    /// Samples per pixel of the pair that has told it.
+    by: u32,
+}
+
+impl PairCost {
+    /// A pair of `spp` samples per pixel took so many seconds beyond the first samples. True where it is the one of the most samples, which knows best.
+    pub fn measure(&mut self, spp: u32, seconds: f64) -> bool {
+        let knows_best = spp > self.by;
+        if knows_best {
+            self.sample = seconds / f64::from(2 * (spp - 1).max(1));
+            self.by = spp;
+        }
+        knows_best
+    }
+
+    /// Seconds that a pair of so many samples per pixel takes.
+    pub fn seconds(&self, spp: u32) -> f64 {
+        2.0 * (self.start + self.sample * f64::from(spp.saturating_sub(1)))
+    }
+
+    /// Most samples per pixel of a pair in so many seconds; 0 where not even the first ones fit.
+    pub fn samples(&self, seconds: f64) -> u32 {
+        let left = seconds / 2.0 - self.start;
+        if left < 0.0 {
+            return 0;
+        }
+        (1.0 + left / self.sample.max(1e-12)).min(f64::from(u32::MAX)) as u32
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    // A last pair of more samples than rounds had makes no sample dearer.
+    #[test]
+    fn pairs_fit_the_time_that_they_take() {
+        let mut cost = PairCost {
+            start: 0.5,
+            ..PairCost::default()
+        };
+        let seconds = |spp: u32| 2.0 * 0.125 * f64::from(spp - 1);
+        assert!(cost.measure(4, seconds(4)) && cost.measure(16, seconds(16)));
+        assert!(!cost.measure(8, 100.0));
+        assert_eq!([1, 4, 64].map(|spp| cost.samples(cost.seconds(spp))), [1, 4, 64]);
+        assert_eq!(cost.seconds(64), 1.0 + seconds(64));
+        assert_eq!([cost.samples(0.9), cost.samples(f64::INFINITY)], [0, u32::MAX]);
+    }
 
     /// Of a kernel's blur, with a reduction of 2/3.
     const BLUR: Law = Law {

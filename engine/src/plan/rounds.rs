@@ -25,12 +25,15 @@ const LEAST_LAST_PAIR: u32 = ROUNDS[1];
 const PICTURE_OVER_PILOT: u32 = 16;
 /// A longer last pair has at least so many times the samples of the one before.
 const LONGER: u32 = 4;
-/// Beyond the relative MSE of what has met light.
-const UNLIT_COST: f64 = f64::MAX;
+/// Beyond the seconds and the squared error of what has met light; [`HOPELESS`] times as much is still a number.
+const UNLIT_COST: f64 = f64::MAX / 4.0;
 /// Beyond every other cost: of what cannot be chosen.
 const IMPOSSIBLE_COST: f64 = f64::INFINITY;
-/// Seconds that pilots may take after their beginning beside a picture that is not long, where no time is to be kept.
-const FREE_SECONDS: f64 = 2.0;
+/// Seconds that pilots may take after their beginning beside a picture that is not long, where no time is to be kept: with a short beginning they are
+/// within their share of one that turns out to be long, too.
+const FREE_SECONDS: f64 = 1.0;
+/// Seconds that the beginning of pilots and the picture's own error of prediction are allowed for.
+const ALLOWANCE: f64 = 1.0;
 /// A candidate whose predicted cost is beyond this many times the best one's gets no further round.
 const HOPELESS: f64 = 2.0;
 
@@ -40,22 +43,28 @@ fn room(part: f64, goal: Goal, [least, expected]: [f64; 2], spent: f64, rounds: 
     match goal.time {
         Some(time) => part * PILOT_SHARE * time.as_secs_f64() - spent,
         // By the least that the picture may take; with one that makes five seconds of both, pilots are within their share, too.
-        None if expected + FREE_SECONDS > LONG => {
+        None if expected + FREE_SECONDS + ALLOWANCE > LONG => {
             part * (PILOT_SHARE / (1.0 - PILOT_SHARE) * least).max(PILOT_SHARE * LONG) - spent
         }
         None => part * FREE_SECONDS - rounds,
     }
 }
 
-/// Whether one more candidate would take pilots beyond their share of a long picture, or of the time to keep.
+/// Whether one more candidate, which takes about as long as each of those before, would take pilots beyond what rounds may take of the picture's time, or of
+/// [`LONG`] where that is more; with a time to keep, whether they are beyond it.
 pub fn is_late(trials: &[Option<Trial<'_>>], goal: Goal, spent: f64) -> bool {
     if let Some(time) = goal.time {
         return spent > ROUNDS_SHARE * PILOT_SHARE * time.as_secs_f64();
     }
     let least = |trial: &Trial<'_>| trial.picture_seconds(goal, spent)[0];
     let picture = trials.iter().flatten().map(least).fold(f64::INFINITY, f64::min);
-    let all = picture + spent;
-    all.is_finite() && all > LONG && spent > PILOT_SHARE * all
+    is_beyond(trials.iter().flatten().count(), picture, spent)
+}
+
+/// Whether one more candidate after so many is one too many beside a picture that takes at least so many seconds.
+fn is_beyond(tried: usize, picture: f64, spent: f64) -> bool {
+    let with_another = spent * (1.0 + 1.0 / tried as f64);
+    with_another > ROUNDS_SHARE * PILOT_SHARE * (picture + spent).max(LONG)
 }
 
 /// Renders the last pair of the chosen one: as many samples as there is time for, and no more than the picture needs. Where it says that the picture takes
@@ -67,7 +76,7 @@ pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, start: Instant, r
         let wanted = trial.samples(asked.goal, spent);
         let picture = trial.picture_seconds(asked.goal, spent);
         let room = room(1.0, asked.goal, picture, spent, rounds_before + trial.all_seconds);
-        let fits = trial.pair_samples(room).min(wanted).min(LAST_PAIR);
+        let fits = trial.pairs.samples(room).min(wanted).min(LAST_PAIR);
         let spp = match trial.last_spp() {
             0 => {
                 let least = least_of_last_pair(trial.law.samples_least, trial.spp, wanted);
@@ -79,8 +88,7 @@ pub fn run_last_pair(trial: &mut Trial<'_>, asked: &Asked<'_>, start: Instant, r
             before if fits >= LONGER * before && asked.proceeds() => fits,
             _ => return Ok(()),
         };
-        trial.conclude(asked, spp)?;
-        if !trial.can_be_chosen() {
+        if !trial.conclude(asked, spp)? || !trial.can_be_chosen() {
             return Ok(());
         }
     }
@@ -112,14 +120,17 @@ pub fn run_rounds(
         // Under a time alone all take equally long, and the one with the smaller error is the better one.
         let cost = |trial: &Trial<'_>| match goal.error {
             _ if !trial.is_possible(goal) => IMPOSSIBLE_COST,
-            Some(_) => predicted(trial),
             // What has met no light is the last choice, but goes on as long as nothing else has.
-            None if trial.lit => trial.relative_mse(trial.samples(goal, spent)),
-            None => UNLIT_COST,
+            _ if !trial.lit => UNLIT_COST,
+            Some(_) => predicted(trial),
+            None => trial.squared_error(trial.samples(goal, spent)),
         };
         let able = || trials.iter().flatten().filter(|trial| trial.can_be_chosen());
         let best = able().map(&cost).fold(f64::INFINITY, f64::min);
-        let picture = able().map(|trial| trial.picture_seconds(goal, spent));
+        // Of what has met light, where anything has.
+        let lit = able().any(|trial| trial.lit);
+        let picture = able().filter(|trial| trial.lit == lit);
+        let picture = picture.map(|trial| trial.picture_seconds(goal, spent));
         let picture = picture.fold([f64::INFINITY; 2], |[a, b], [least, expected]| {
             [a.min(least), b.min(expected)]
         });
@@ -153,7 +164,7 @@ pub fn run_rounds(
                 .zip(&on)
                 .filter(|(_, on)| **on)
                 .filter_map(|(trial, _)| trial.as_ref())
-                .map(|t| t.pair_seconds(spp))
+                .map(|t| t.pairs.seconds(spp))
                 .sum();
             (next <= allowed || blind).then_some(on)
         });
@@ -223,7 +234,7 @@ mod tests {
             assert!((room(1.0, free, picture, 0.5, 0.1) - (1.25 - 0.5)).abs() < 1e-12);
         }
         // Short: seconds of rounds alone.
-        assert!((room(1.0, free, [0.1; 2], 5.0, 0.5) - 1.5).abs() < 1e-12);
+        assert!((room(1.0, free, [0.1; 2], 5.0, 0.5) - 0.5).abs() < 1e-12);
         let timed = Goal {
             error: None,
             time: Some(Duration::from_secs(8)),
@@ -231,5 +242,11 @@ mod tests {
         assert!((room(1.0, timed, [6.0; 2], 0.5, 0.1) - 1.5).abs() < 1e-12);
         // Before any candidate has been tried nothing is late but a time.
         assert!(!is_late(&[], free, 100.0) && is_late(&[], timed, 2.0));
+        // Rounds may take 0.75 s beside five seconds or less, and 3 s beside twenty.
+        assert_eq!(
+            [(1, 0.4), (3, 0.5), (3, 0.6)].map(|(n, spent)| is_beyond(n, 0.5, spent)),
+            [true, false, true]
+        );
+        assert_eq!([1.4, 1.6].map(|spent| is_beyond(1, 20.0 - spent, spent)), [false, true]);
     }
 }

@@ -7,7 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 use super::judgement::Judgement;
-use super::model::{CostModel, ErrorModel};
+use super::model::{CostModel, ErrorModel, PairCost};
 use super::noise::{Pair, Truth, noise_of_pairs};
 use super::paths::same_picture;
 use super::{Candidate, Goal, Reference};
@@ -75,8 +75,9 @@ pub struct Trial<'a> {
     pub cost: CostModel,
     /// Share of a pilot sample's time that does not depend on the number of pixels.
     fixed: f64,
-    /// Seconds of both pilots' samples in its last round, but the first ones; of all rounds, with their beginnings.
-    round_seconds: f64,
+    /// What its own pairs cost.
+    pub pairs: PairCost,
+    /// Seconds of all pairs, with their beginnings.
     pub all_seconds: f64,
 }
 
@@ -183,7 +184,7 @@ impl<'a> Trial<'a> {
             law,
             cost: CostModel::default(),
             fixed: 0.0,
-            round_seconds: 0.0,
+            pairs: PairCost::default(),
             all_seconds: 0.0,
         };
         let gave_up = |which: &str| {
@@ -210,6 +211,7 @@ impl<'a> Trial<'a> {
             return Err(gave_up(not_first));
         }
         trial.cost.start = from.elapsed().as_secs_f64();
+        trial.pairs.start = trial.cost.start;
         let small = size.map(|side| (side / SMALL).max(1));
         let alike = card.bias == Bias::Unbiased || size == options.size;
         let small_seconds = if alike {
@@ -230,8 +232,9 @@ impl<'a> Trial<'a> {
         }
         if let Some(small_seconds) = small_seconds {
             let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-            trial.fixed = fixed_share([area(small), small_seconds], [area(size), trial.round_seconds / 2.0]);
-            trial.cost.sample = trial.seconds_a_sample(ROUNDS[0], asked.pixels());
+            let seconds = trial.pairs.sample * f64::from(ROUNDS[0] - 1);
+            trial.fixed = fixed_share([area(small), small_seconds], [area(size), seconds]);
+            trial.cost.sample = trial.seconds_a_sample(asked.pixels());
         }
         Ok(Some(trial))
     }
@@ -279,10 +282,8 @@ impl<'a> Trial<'a> {
         };
         let pictures = [one, other];
         self.all_seconds += from.elapsed().as_secs_f64();
-        // The more samples, the better it is known.
-        if spp > self.spp {
-            self.round_seconds = seconds;
-            self.cost.sample = self.seconds_a_sample(spp, asked.pixels());
+        if self.pairs.measure(spp, seconds) {
+            self.cost.sample = self.seconds_a_sample(asked.pixels());
         }
         Ok(Some(pictures))
     }
@@ -312,22 +313,22 @@ impl<'a> Trial<'a> {
     }
 
     /// The last pair, of `spp` samples per pixel: from now on it alone says how large the error is. What keeps it from that is
-    /// [`failure`](Self::failure); where it is given up, what was found before stands.
-    pub fn conclude(&mut self, asked: &Asked<'_>, spp: u32) -> Result<()> {
+    /// [`failure`](Self::failure); where it is given up, which is false, what was found before stands.
+    pub fn conclude(&mut self, asked: &Asked<'_>, spp: u32) -> Result<bool> {
         let seeds = SEED_PAIRS - LAST_PAIRS + self.last_pairs;
         let concluded = self.pair(asked, spp, seeds).and_then(|pictures| {
             let Some(pictures) = pictures else {
-                return Ok(());
+                return Ok(false);
             };
             self.last_pairs += 1;
             let before = self.last.replace(Stage { spp, pictures });
             self.stages.extend(before);
-            self.measure()
+            self.measure().map(|()| true)
         });
-        if let Err(error) = concluded {
+        concluded.or_else(|error| {
             self.failure = reason_of(error)?;
-        }
-        Ok(())
+            Ok(true)
+        })
     }
 
     /// Samples per pixel of the last pair; 0 without.
@@ -370,36 +371,15 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// Seconds for each sample per pixel of a picture of so many pixels, by a pair of so many samples.
-    fn seconds_a_sample(&self, spp: u32, pixels: f64) -> f64 {
+    /// Seconds for each sample per pixel of a picture of so many pixels.
+    fn seconds_a_sample(&self, pixels: f64) -> f64 {
         let larger = pixels / self.pixels();
-        self.pilot_seconds_a_sample(spp) * (self.fixed + (1.0 - self.fixed) * larger)
-    }
-
-    /// Of one pilot, by a pair of so many samples.
-    fn pilot_seconds_a_sample(&self, spp: u32) -> f64 {
-        self.round_seconds / f64::from(2 * (spp - 1).max(1))
+        self.pairs.sample * (self.fixed + (1.0 - self.fixed) * larger)
     }
 
     /// Pixels of a pilot.
     fn pixels(&self) -> f64 {
         f64::from(self.size[0]) * f64::from(self.size[1])
-    }
-
-    /// Seconds that a pair of so many samples per pixel takes.
-    pub fn pair_seconds(&self, spp: u32) -> f64 {
-        let each = self.pilot_seconds_a_sample(self.spp) * f64::from(spp.saturating_sub(1));
-        2.0 * (self.cost.start + each)
-    }
-
-    /// Most samples per pixel of a pair in so many seconds; 0 where not even the first ones fit.
-    pub fn pair_samples(&self, seconds: f64) -> u32 {
-        let left = seconds / 2.0 - self.cost.start;
-        if left < 0.0 {
-            return 0;
-        }
-        let each = self.pilot_seconds_a_sample(self.spp).max(1e-12);
-        (1.0 + left / each).min(f64::from(u32::MAX)) as u32
     }
 
     /// Seconds that the picture for the goal takes at the least, in 19 of 20 cases, by how well its error is known, and those expected, when the pilots
@@ -447,6 +427,12 @@ impl<'a> Trial<'a> {
         }
     }
 
+    /// Squared error, relative to the radiance's square, expected of that many samples per pixel: noise and bias together.
+    pub fn squared_error(&self, samples: u32) -> f64 {
+        let bias = self.judgement.bias.map_or(0.0, |bias| bias.square(samples.into()));
+        self.relative_mse(samples) + bias
+    }
+
     /// Whether it is a candidate whose pilots did not fail.
     pub fn can_be_chosen(&self) -> bool {
         self.is_candidate && self.failure.is_empty()
@@ -479,7 +465,7 @@ impl<'a> Trial<'a> {
         candidate.error = (noise + bias.map_or(0.0, |bias| bias.square(samples))).sqrt();
         candidate.error_interval = bias.filter(|_| self.lit).map(|bias| {
             let factor = self.error.factor(samples, asked_pixels / self.pixels());
-            let least = (candidate.noise / factor).hypot(bias.square(samples).sqrt());
+            let least = (candidate.noise / factor).hypot(bias.lower(samples).sqrt());
             let most = (candidate.noise * factor).hypot(bias.upper(samples).sqrt());
             [least, most]
         });
