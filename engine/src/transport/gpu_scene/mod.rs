@@ -28,7 +28,7 @@ use self::kept::{Keeping, KeptInstances};
 use self::light_tree::TreeOfLights;
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
-use self::materials::{material_record, materials_by_use};
+use self::materials::{Metals, material_record, materials_by_use};
 use self::media::GpuMedia;
 use self::punctual::PunctualLights;
 use self::textures::Textures;
@@ -186,10 +186,10 @@ impl GpuScene {
             .iter()
             .filter(|(material, placed)| *placed && !material.boundary);
         let bsdf = BsdfFeatures::of_materials(placed.map(|(material, _)| *material));
-        let mut textures = Textures::default();
+        let (mut textures, mut metals) = (Textures::default(), Metals::default());
         let records: Vec<_> = materials
             .iter()
-            .map(|(material, _)| material_record(&mut textures, scene, material))
+            .map(|(material, _)| material_record(&mut textures, &mut metals, scene, material))
             .collect();
         let lights = Lights::collect(scene, &profile, &mut geometry, &records, bounds)?;
         let albedo: &[f32] = if bsdf.specular_layer || bsdf.multiple_scattering {
