@@ -125,7 +125,7 @@ fn the_sidecar_of_the_reference_is_understood() {
     assert!(scene.materials[0].conductor.is_some() && scene.materials[1].conductor.is_some());
     assert!(scene.materials[2..5].iter().all(|metal| metal.conductor.is_some()));
     assert_eq!(scene.materials[2].fresnel, scene::FresnelForm::Compensated);
-    assert!(scene.materials[5].microfacets.is_some() && scene.materials[2].microfacets.is_none());
+    assert!(scene.materials[5].classic_microfacets.is_some() && scene.materials[2].classic_microfacets.is_none());
     assert!(scene.materials[6].phong && scene.materials[6].metallic == 0.4);
     assert_eq!((scene.defaults.exposure, scene.cameras[0].lens_radius), (0.5, 0.01));
     assert_eq!(scene.defaults.aspect, Some(1.5));
@@ -149,7 +149,7 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         let ring = &scene.materials[0];
         assert_eq!((ring.conductor, ring.fresnel, ring.metallic), (gold, form, 1.0));
         let profile = SceneProfile::of(&scene);
-        assert!(profile.has_conductor && profile.has_fitted_conductor == (form != FresnelForm::Exact));
+        assert!(profile.has_conductor && profile.has_other_conductor == (form != FresnelForm::Exact));
     }
     assert_eq!(load_metal("\"gold\"").materials[0].fresnel, FresnelForm::Exact);
     let spectrum = load_metal("{ spectrum = \"n k.csv\" }").materials[0]
@@ -169,8 +169,9 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         ("{ metal = \"gold\", eta = [1, 1, 1] }", "needs one of"),
         ("{ eta = [1, 1, 1] }", "needs one of"),
         ("{ fresnel = \"rescaled\" }", "needs one of"),
-        ("{ eta = [0, 1, 1], k = [1, 1, 1] }", "eta above 0"),
-        ("{ eta = [1, 1, 1], k = [1, nan, 1] }", "k at least 0"),
+        ("{ eta = [0, 1, 1], k = [1, 1, 1] }", "eta from a millionth"),
+        ("{ eta = [1, 1, 1], k = [1e10, 1, 1] }", "k from 0 to a million"),
+        ("{ eta = [1, 1, 1], k = [1, nan, 1] }", "k from 0 to a million"),
         ("{ reflectance = [1, 1, 2], edge_tint = [0, 0, 0] }", "from 0 to 1"),
         ("{ spectrum = \"nowhere.csv\" }", "metals.ring.spectrum"),
         ("{ spectrum = \"m.obj\" }", "line 1"),
@@ -179,13 +180,13 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         assert!(message.contains(words), "{text}: {message}");
     }
     let beckmann = load_metal("{ metal = \"gold\", distribution = \"beckmann\" }");
-    let microfacets = beckmann.materials[0].microfacets.expect("microfacets");
+    let microfacets = beckmann.materials[0].classic_microfacets.expect("microfacets");
     assert_eq!(
         (microfacets.distribution, microfacets.geometry),
         (Distribution::Beckmann, Geometry::CookTorrance)
     );
     assert!(SceneProfile::of(&beckmann).has_classic_microfacets);
-    let simplified = load_metal("{ metal = \"gold\", geometry = \"simplified\" }").materials[0].microfacets;
+    let simplified = load_metal("{ metal = \"gold\", geometry = \"simplified\" }").materials[0].classic_microfacets;
     assert_eq!(
         simplified,
         Some(Microfacets {
@@ -193,6 +194,16 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
             geometry: Geometry::Simplified,
         })
     );
+    // Materials that cannot have them are named by the sidecar's key.
+    for name in ["worn metal", "glass"] {
+        let metal = format!("{name:?} = {{ metal = \"gold\", distribution = \"beckmann\" }}");
+        let folder = folder(&format!("file = \"builtin:materials\"\n[metals]\n{metal}\n"));
+        let message = load(folder.path(), "m.scene.toml").expect_err(name).to_string();
+        assert!(
+            message.contains(&format!("metals.{name}")) && message.contains("microfacets"),
+            "{message}"
+        );
+    }
     let mut partial = beckmann;
     partial.materials[0].metallic = 0.5;
     let message = partial.check().expect_err("half a metal").to_string();

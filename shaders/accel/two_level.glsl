@@ -2,8 +2,8 @@
 // out of instances, and how a stopped ray goes on.
 //
 // Rounds as in wide.glsl, whose loops these are. A round ends, too, where a ray goes into an instance or out of one, which happens between rounds, where
-// lanes wait for each other. Triangles are tested in world space: their corners' images are made on the way. The quota must exceed twice WIDE_MAX_DEPTH; to it a
-// round adds WIDE_ROUND_ITERATIONS, a node and its triangles at most. With a filter each candidate that is asked about is a round of its own, and
+// lanes wait for each other. Triangles are tested in world space: their corners' images are made on the way. The quota must be at least twice WIDE_MAX_DEPTH and
+// three times WIDE_ROUND_ITERATIONS, or a stopped ray may not get on (DeviceTraversal::least_quota); to it a round adds WIDE_ROUND_ITERATIONS, a node and its triangles at most. With a filter each candidate that is asked about is a round of its own, and
 // counts as INSTANCE_SEARCH_STEPS more, since whoever is asked may have to find its instance.
 #ifndef CLERESTORY_ACCEL_TWO_LEVEL_GLSL
 #define CLERESTORY_ACCEL_TWO_LEVEL_GLSL
@@ -101,7 +101,7 @@ uint two_level_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit)
     uint root = 0u;
     uint above = 0u;
     uint first_index = 0u;
-    uint walk = 0u;
+    uint first_node = 0u;
     uint flags = INSTANCE_IDENTITY;
     vec3 row_x = vec3(0.0);
     vec3 row_y = vec3(0.0);
@@ -237,7 +237,7 @@ uint two_level_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit)
             row_z = uintBitsToFloat(world_z.xyz);
             translation = uintBitsToFloat(at.xyz);
             first_index = world_x.w;
-            walk = world_y.w;
+            first_node = world_y.w;
             flags = x.w;
             root = z.w;
             node = root;
@@ -258,7 +258,7 @@ uint two_level_traverse(Ray ray, uint resume, const bool any_hit, inout Hit hit)
     if (INDEX_COUNT) {
         index_counters.iterations += iterations;
     }
-    return root != 0u && node != INDEX_FINISHED ? walk + (node - root) : node;
+    return root != 0u && node != INDEX_FINISHED ? first_node + (node - root) : node;
 }
 
 #endif

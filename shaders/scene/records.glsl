@@ -7,7 +7,7 @@ const uint NO_TEXTURE = 0xFFFFFFFFu;
 
 const uint MATERIAL_DOUBLE_SIDED = 1u;
 const uint MATERIAL_UNLIT = 2u;
-const uint MATERIAL_CONDUCTOR = 4u;
+const uint MATERIAL_EXACT_CONDUCTOR = 4u;
 const uint MATERIAL_MASK = 8u;
 const uint MATERIAL_BLEND = 16u;
 const uint MATERIAL_BOUNDARY = 32u;  // not there but for the medium that it bounds
@@ -69,11 +69,11 @@ struct SceneMaterial {
     float metallic;
     vec3 specular_color;
     float roughness;
-    vec3 conductor_eta;
+    vec3 conductor_a;
     float transmission;
-    vec3 conductor_k;
+    vec3 conductor_b;
     float ior;
-    vec3 conductor_average;
+    vec3 conductor_c;
     float specular;
     vec3 absorption;  // absorption coefficient inside, 1/m
     float thickness;

@@ -11,7 +11,7 @@
 // reciprocal, transmission up to eta^2; specular 0 without transmission and metal is exactly Lambert. From inside a solid
 // (wo.z < 0) the diffuse base is black: what glTF calls its opaque part absorbs.
 // Frame: z is the shading normal; of a solid it points out of the body. Opaque and thin surfaces scatter alike on both sides.
-// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_CONDUCTOR, HAS_SCHLICK_CONDUCTOR, HAS_COMPENSATED_CONDUCTOR,
+// Expects, declared before the inclusion: bool constants HAS_METAL, HAS_EXACT_CONDUCTOR, HAS_SCHLICK_CONDUCTOR, HAS_COMPENSATED_CONDUCTOR,
 // HAS_TINTED_CONDUCTOR, HAS_SIMPLIFIED_CONDUCTOR, HAS_CLASSIC_MICROFACETS, HAS_PHONG, HAS_SPECULAR_LAYER,
 // HAS_TRANSMISSION, HAS_MULTIPLE_SCATTERING, SEPARABLE_MASKING; `float albedo_table(uint)`, read only if HAS_SPECULAR_LAYER or
 // HAS_MULTIPLE_SCATTERING.
@@ -37,12 +37,12 @@ const uint LOBE_TRANSMISSION = 42u;
 const uint LOBE_ALL = 63u;
 
 const uint BSDF_THIN = 1u;        // transmission goes straight through a thin wall
-const uint BSDF_CONDUCTOR = 2u;   // the metal is conductor_eta + i conductor_k, not base_color
+const uint BSDF_EXACT_CONDUCTOR = 2u;  // the metal is conductor_a + i conductor_b, not base_color
 const uint BSDF_IMPORTANCE = 4u;  // wo is where particles come from: no 1/eta^2
 const uint BSDF_PHONG = 8u;       // the metal is a modified Phong lobe of reflectance base_color
-// The metal is a conductor in another form than the exact one: what stands in conductor_eta and conductor_k.
+// The metal is a conductor in another form than the exact one: what stands in conductor_a and conductor_b.
 const uint BSDF_SCHLICK_CONDUCTOR = 16u;      // F0
-const uint BSDF_COMPENSATED_CONDUCTOR = 32u;  // F0 and a, with the exponents in conductor_average
+const uint BSDF_COMPENSATED_CONDUCTOR = 32u;  // F0 and a, with the exponents in conductor_c
 const uint BSDF_TINTED_CONDUCTOR = 64u;       // F0 and b
 const uint BSDF_SIMPLIFIED_CONDUCTOR = 128u;  // eta and k
 // The metal's microfacets are not GGX's with Smith's masking, and are not compensated for multiple scattering: GGX's, Beckmann's or a cosine lobe, with the
@@ -63,11 +63,11 @@ struct Bsdf {
     float metallic;
     vec3 specular_f0;      // normal reflectance of the layer: min(F0(eta) specular_color, 1)
     float specular;
-    vec3 conductor_eta;
+    vec3 conductor_a;
     float alpha;           // GGX width, which stands for a Phong exponent too; a mirror below ALPHA_MIN
-    vec3 conductor_k;
+    vec3 conductor_b;
     float transmission;
-    vec3 conductor_average;  // cosine-weighted average of the conductor's factor
+    vec3 conductor_c;      // cosine-weighted average of the conductor's factor, or an exponent
     float eta;             // index inside / outside; 0 stands for Schlick's factor
     uint flags;
 };
@@ -100,9 +100,9 @@ Bsdf bsdf_gltf(vec3 base_color, float metallic, float roughness, float transmiss
     b.transmission = ior <= 0.0 ? 0.0 : clamp(transmission, 0.0, 1.0);
     b.specular = clamp(specular, 0.0, 1.0);
     b.specular_f0 = clamp(fresnel_f0(b.eta) * specular_color, vec3(0.0), vec3(1.0));
-    b.conductor_eta = vec3(1.0);
-    b.conductor_k = vec3(0.0);
-    b.conductor_average = vec3(0.0);
+    b.conductor_a = vec3(1.0);
+    b.conductor_b = vec3(0.0);
+    b.conductor_c = vec3(0.0);
     b.flags = thickness > 0.0 ? 0u : BSDF_THIN;
     if (thickness > 0.0 && b.transmission > 0.0 && b.alpha >= ALPHA_MIN) {
         b.eta = max(b.eta, ETA_MATCHED);
@@ -131,20 +131,20 @@ vec3 metal_fresnel(Bsdf b, float cos_h) {
     if (bsdf_is_phong(b)) {
         return b.base_color;
     }
-    if (HAS_CONDUCTOR && (b.flags & BSDF_CONDUCTOR) != 0u) {
-        return fresnel_conductor(cos_h, b.conductor_eta, b.conductor_k);
+    if (HAS_EXACT_CONDUCTOR && (b.flags & BSDF_EXACT_CONDUCTOR) != 0u) {
+        return fresnel_conductor(cos_h, b.conductor_a, b.conductor_b);
     }
     if (HAS_SCHLICK_CONDUCTOR && (b.flags & BSDF_SCHLICK_CONDUCTOR) != 0u) {
-        return fresnel_schlick(cos_h, b.conductor_eta);
+        return fresnel_schlick(cos_h, b.conductor_a);
     }
     if (HAS_COMPENSATED_CONDUCTOR && (b.flags & BSDF_COMPENSATED_CONDUCTOR) != 0u) {
-        return fresnel_compensated(cos_h, b.conductor_eta, b.conductor_k, b.conductor_average);
+        return fresnel_compensated(cos_h, b.conductor_a, b.conductor_b, b.conductor_c);
     }
     if (HAS_TINTED_CONDUCTOR && (b.flags & BSDF_TINTED_CONDUCTOR) != 0u) {
-        return fresnel_tinted(cos_h, b.conductor_eta, b.conductor_k);
+        return fresnel_tinted(cos_h, b.conductor_a, b.conductor_b);
     }
     if (HAS_SIMPLIFIED_CONDUCTOR && (b.flags & BSDF_SIMPLIFIED_CONDUCTOR) != 0u) {
-        return fresnel_simplified(cos_h, b.conductor_eta, b.conductor_k);
+        return fresnel_simplified(cos_h, b.conductor_a, b.conductor_b);
     }
     return fresnel_schlick(cos_h, b.base_color);
 }
@@ -181,7 +181,7 @@ vec4 classic_eval(Bsdf b, vec3 wo, vec3 wi) {
 
 // The flags of the conductors that are compiled in.
 uint conductor_flags() {
-    return (HAS_CONDUCTOR ? BSDF_CONDUCTOR : 0u) | (HAS_SCHLICK_CONDUCTOR ? BSDF_SCHLICK_CONDUCTOR : 0u)
+    return (HAS_EXACT_CONDUCTOR ? BSDF_EXACT_CONDUCTOR : 0u) | (HAS_SCHLICK_CONDUCTOR ? BSDF_SCHLICK_CONDUCTOR : 0u)
         | (HAS_COMPENSATED_CONDUCTOR ? BSDF_COMPENSATED_CONDUCTOR : 0u) | (HAS_TINTED_CONDUCTOR ? BSDF_TINTED_CONDUCTOR : 0u)
         | (HAS_SIMPLIFIED_CONDUCTOR ? BSDF_SIMPLIFIED_CONDUCTOR : 0u);
 }
@@ -192,8 +192,8 @@ bool bsdf_is_conductor(Bsdf b) { return (b.flags & conductor_flags()) != 0u; }
 // Cosine-weighted hemispherical average of a conductor's factor.
 vec3 conductor_average(Bsdf b) {
     return HAS_COMPENSATED_CONDUCTOR && (b.flags & BSDF_COMPENSATED_CONDUCTOR) != 0u
-        ? fresnel_compensated_average(b.conductor_eta, b.conductor_k, b.conductor_average)
-        : b.conductor_average;
+        ? fresnel_compensated_average(b.conductor_a, b.conductor_b, b.conductor_c)
+        : b.conductor_c;
 }
 
 // What the layer reflects of a microfacet (r) and what goes through it (t), as the mask allows.

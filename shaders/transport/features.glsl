@@ -5,7 +5,7 @@
 #include "transport/attribute_features.glsl"
 
 layout(constant_id = 0) const bool HAS_METAL = true;
-layout(constant_id = 1) const bool HAS_CONDUCTOR = true;               // exact complex index of refraction
+layout(constant_id = 1) const bool HAS_EXACT_CONDUCTOR = true;         // exact complex index of refraction
 layout(constant_id = 2) const bool HAS_SPECULAR_LAYER = true;          // dielectric reflection
 layout(constant_id = 3) const bool HAS_TRANSMISSION = true;
 layout(constant_id = 4) const bool HAS_MULTIPLE_SCATTERING = true;     // compensation of rough metals

@@ -26,7 +26,8 @@ float fresnel_dielectric(float cos_i, float eta) {
     return min(1.0, 0.5 * a * a * (1.0 + b * b));
 }
 
-// What keeps the one case of 0/0 defined: no interface (eta = 1, k = 0) at a cosine of 0, which reflects nothing.
+// What keeps the cases of 0/0 defined: no interface (eta = 1, k = 0) at a cosine of 0, which reflects nothing, and an index too small for its square at a
+// cosine of 1.
 const float LEAST_SUM = 1e-30;
 
 // Exact conductor against vacuum, per band; complex index eta + i k.
@@ -43,7 +44,7 @@ vec3 fresnel_conductor(float cos_i, vec3 eta, vec3 k) {
     vec3 rs = (sum - cross_s) / (sum + cross_s + LEAST_SUM);
     vec3 sum_p = c2 * a2b2 + s2 * s2;
     vec3 cross_p = cross_s * s2;
-    vec3 rp = rs * (sum_p - cross_p) / (sum_p + cross_p);
+    vec3 rp = rs * (sum_p - cross_p) / (sum_p + cross_p + LEAST_SUM);
     return clamp(0.5 * (rs + rp), vec3(0.0), vec3(1.0));
 }
 

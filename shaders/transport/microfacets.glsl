@@ -6,7 +6,7 @@
 #ifndef CLERESTORY_TRANSPORT_MICROFACETS_GLSL
 #define CLERESTORY_TRANSPORT_MICROFACETS_GLSL
 
-#include "transport/phong.glsl"
+#include "transport/below_one.glsl"
 #include "transport/warp.glsl"
 
 // Below this cosine of microfacet incidence the simplified term is cut off.

@@ -7,26 +7,11 @@
 #ifndef CLERESTORY_TRANSPORT_PHONG_GLSL
 #define CLERESTORY_TRANSPORT_PHONG_GLSL
 
+#include "transport/below_one.glsl"
 #include "transport/warp.glsl"
-
-// Below it series are exact to the last digits.
-const float PHONG_SERIES_MAX = 0.25;
 
 // The exponent whose lobe is about as wide as the GGX lobe of width alpha in (0, 1] (Walter et al. 2007, 5.2); 0 for 1.
 float phong_exponent(float alpha) { return 0.5 * (1.0 / (alpha * alpha) - 1.0); }
-
-// ln(1 - x) for x in [0, 1), exact near 0: twice the series of the inverse hyperbolic tangent.
-float log_below_one(float x) {
-    float y = x / (2.0 - x);
-    float s = y * y;
-    return x < PHONG_SERIES_MAX ? -2.0 * y * (1.0 + s * (1.0 / 3.0 + s * (0.2 + s * (1.0 / 7.0)))) : log(1.0 - x);
-}
-
-// 1 - exp(-x) for x >= 0, exact near 0.
-float exp_below_one(float x) {
-    float series = x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0 * (1.0 - x / 6.0)))));
-    return x < PHONG_SERIES_MAX ? series : 1.0 - exp(-x);
-}
 
 // cos^n of the angle from the mirror direction; 0 from a right angle on.
 float phong_power(float exponent, vec3 wo, vec3 wi) {

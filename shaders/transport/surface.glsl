@@ -98,18 +98,18 @@ Bsdf surface_bsdf(SceneMaterial m, Surface s) {
     vec3 specular_color = m.specular_color * material_texture(m.specular_color_texture, s.uvs).rgb;
     Bsdf b = bsdf_gltf(base_color, m.metallic * metallic_roughness.b, m.roughness * metallic_roughness.g, transmission, m.ior,
                        specular, specular_color, m.thickness);
-    if (HAS_CONDUCTOR && (m.flags & MATERIAL_CONDUCTOR) != 0u) {
-        b.conductor_eta = m.conductor_eta;
-        b.conductor_k = m.conductor_k;
-        b.conductor_average = m.conductor_average;
-        b.flags |= BSDF_CONDUCTOR;
+    if (HAS_EXACT_CONDUCTOR && (m.flags & MATERIAL_EXACT_CONDUCTOR) != 0u) {
+        b.conductor_a = m.conductor_a;
+        b.conductor_b = m.conductor_b;
+        b.conductor_c = m.conductor_c;
+        b.flags |= BSDF_EXACT_CONDUCTOR;
     }
     // The forms' flags of materials are those of scattering functions, shifted.
-    uint form = (m.flags >> MATERIAL_FORM_SHIFT) & conductor_flags() & ~BSDF_CONDUCTOR;
+    uint form = (m.flags >> MATERIAL_FORM_SHIFT) & conductor_flags() & ~BSDF_EXACT_CONDUCTOR;
     if ((HAS_SCHLICK_CONDUCTOR || HAS_COMPENSATED_CONDUCTOR || HAS_TINTED_CONDUCTOR || HAS_SIMPLIFIED_CONDUCTOR) && form != 0u) {
-        b.conductor_eta = m.conductor_eta;
-        b.conductor_k = m.conductor_k;
-        b.conductor_average = m.conductor_average;
+        b.conductor_a = m.conductor_a;
+        b.conductor_b = m.conductor_b;
+        b.conductor_c = m.conductor_c;
         b.flags |= form;
     }
     if (HAS_CLASSIC_MICROFACETS) {

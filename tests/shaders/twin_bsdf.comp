@@ -6,7 +6,7 @@
 #include "twin_interface.glsl"
 
 const bool HAS_METAL = true;
-const bool HAS_CONDUCTOR = true;
+const bool HAS_EXACT_CONDUCTOR = true;
 const bool HAS_SCHLICK_CONDUCTOR = true;
 const bool HAS_COMPENSATED_CONDUCTOR = true;
 const bool HAS_TINTED_CONDUCTOR = true;
@@ -27,9 +27,9 @@ void main() {
         return;
     }
     Bsdf b = bsdf_gltf(in3(0u), in1(3u), in1(4u), in1(5u), in1(6u), in1(7u), in3(8u), in1(11u));
-    b.conductor_eta = in3(12u);
-    b.conductor_k = in3(15u);
-    b.conductor_average = in3(18u);
+    b.conductor_a = in3(12u);
+    b.conductor_b = in3(15u);
+    b.conductor_c = in3(18u);
     b.flags |= in_bits(21u);
     vec3 wo = in3(22u);
     uint mask = in_bits(31u);

@@ -275,7 +275,14 @@ fn normals_and_colours_of_instances_are_those_of_flattened_ones() {
 #[test]
 fn moved_instances_and_refitted_meshes_are_as_if_made_so() {
     with_gpu(|gpu| {
-        let scene = prisms();
+        let mut scene = prisms();
+        // Of any length.
+        scene.meshes[1].normals = scene.meshes[1]
+            .positions
+            .iter()
+            .map(|p| 7.0 * *p - Vec3::new(0.1, 0.9, 0.2))
+            .collect();
+        let scene = scene;
         let kept = uploaded(gpu, &scene, "two-level");
         let settings = PathTracerSettings::default();
         let built = TwoLevelWork {
@@ -299,10 +306,14 @@ fn moved_instances_and_refitted_meshes_are_as_if_made_so() {
         kept.move_instances(gpu, &moves).unwrap();
         assert_eq!(kept.index_work(), Some(TwoLevelWork { tops: 2, ..built }));
         let found = picture(gpu, &scene, &kept, &settings, 2);
-        let truth = picture(gpu, &moved, &uploaded(gpu, &moved, "two-level"), &settings, 2);
+        let made_so = uploaded(gpu, &moved, "two-level");
+        let truth = picture(gpu, &moved, &made_so, &settings, 2);
         assert!(found.bits() == truth.bits() && found.bits() != before.bits());
+        assert_eq!(kept.index_statistics(), made_so.index_statistics());
+        assert_eq!(kept.index_report().statistics, made_so.index_statistics());
         let mut shape = moved.meshes[1].clone();
         shape.positions[5] -= Vec3::new(2.0, 6.0, 1.0) / 64.0;
+        shape.normals[4] *= Vec3::new(-1.0, 3.0, 2.0);
         moved.meshes[1] = shape.clone();
         kept.refit_mesh(gpu, &scene, 1, &shape).unwrap();
         let now = TwoLevelWork {
@@ -315,6 +326,8 @@ fn moved_instances_and_refitted_meshes_are_as_if_made_so() {
         let truth = picture(gpu, &moved, &uploaded(gpu, &moved, "two-level"), &settings, 2);
         assert!(found.bits() == truth.bits());
         let far = DAffine3::from_translation(DVec3::X * 100.0);
+        let mut no_normals = shape.clone();
+        no_normals.normals[2].y = f32::NAN;
         for refused in [
             kept.move_instances(gpu, &[(0, DAffine3::IDENTITY)]),
             kept.move_instances(gpu, &[(4, exact(3))]),
@@ -322,12 +335,96 @@ fn moved_instances_and_refitted_meshes_are_as_if_made_so() {
             kept.move_instances(gpu, &[(99, exact(3))]),
             kept.refit_mesh(gpu, &scene, 0, &scene.meshes[0]),
             kept.refit_mesh(gpu, &scene, 1, &scene.meshes[0]),
+            kept.refit_mesh(gpu, &scene, 1, &no_normals),
             kept.move_object(gpu, &scene, 1, exact(3)),
             uploaded(gpu, &scene, "wide").move_instances(gpu, &moves),
         ] {
             assert!(matches!(refused, Err(Error::Setting { .. })), "{refused:?}");
         }
         assert_eq!(kept.index_work(), Some(now), "what is refused makes nothing");
+    });
+}
+
+/// Octahedra in a row along x, each turned about y.
+fn octahedra(turns: [f64; 3]) -> Scene {
+    let mut scene = Scene {
+        name: "octahedra".into(),
+        cameras: vec![camera()],
+        ..Scene::default()
+    };
+    let stone = scene.add_material(Material::lambert("stone", Vec3::splat(0.5)));
+    let mesh = scene.add_mesh(Mesh {
+        positions: vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z],
+        triangles: [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]]
+            .into_iter()
+            .flat_map(|[a, b, c]| [[a, b, c], [b, a, 5]])
+            .collect(),
+        material: Some(stone),
+        ..Mesh::default()
+    });
+    for (i, turn) in (0..).zip(turns) {
+        scene.instances.push(Instance {
+            mesh,
+            transform: DAffine3::from_rotation_translation(
+                DQuat::from_rotation_y(turn.to_radians()),
+                DVec3::X * 3.0 * f64::from(i),
+            ),
+            name: String::new(),
+        });
+    }
+    scene
+}
+
+#[test]
+fn moves_are_held_against_the_box_by_their_triangles() {
+    with_gpu(|gpu| {
+        let at = |scene: &Scene, object: usize, turn: f64, way: f64| {
+            let turned = DAffine3::from_quat(DQuat::from_rotation_y(turn));
+            let place = scene.instances[object].transform.translation + DVec3::X * way;
+            (object, DAffine3::from_translation(place) * turned)
+        };
+        let scene = octahedra([0.0; 3]);
+        let kept = uploaded(gpu, &scene, "two-level");
+        assert_eq!(kept.bounds(), [Vec3::splat(-1.0), Vec3::new(7.0, 1.0, 1.0)]);
+        // Its loose box is √2 as wide then.
+        kept.move_instances(gpu, &[at(&scene, 2, std::f64::consts::FRAC_PI_4, 0.0)])
+            .unwrap();
+        let refused = kept.move_instances(gpu, &[at(&scene, 2, std::f64::consts::FRAC_PI_4, 0.3)]);
+        assert!(
+            refused
+                .unwrap_err()
+                .to_string()
+                .starts_with("setting object: 2 would leave")
+        );
+        // A scene whose own boxes are as loose has no room besides.
+        let turned = octahedra([45.0; 3]);
+        let kept = uploaded(gpu, &turned, "two-level");
+        let work = kept.index_work();
+        assert!(kept.bounds()[1].x < 6.8);
+        for (object, way) in [(2, 0.5), (0, -0.5)] {
+            let refused = kept.move_instances(gpu, &[at(&turned, object, std::f64::consts::FRAC_PI_4, way)]);
+            assert!(matches!(refused, Err(Error::Setting { .. })), "{object}");
+        }
+        let flat = DAffine3::from_scale(DVec3::new(1.0, 0.0, 1.0));
+        let refused = kept
+            .move_instances(gpu, &[at(&turned, 0, std::f64::consts::FRAC_PI_4, 0.5), (1, flat)])
+            .unwrap_err();
+        assert!(refused.to_string().contains("instances[1].transform"), "{refused}");
+        // Shapes likewise.
+        let shape = |size: f32| {
+            let mut mesh = turned.meshes[0].clone();
+            mesh.positions.iter_mut().for_each(|p| *p *= size);
+            mesh
+        };
+        let refused = kept.refit_mesh(gpu, &turned, 0, &shape(1.2)).unwrap_err();
+        assert!(
+            refused.to_string().starts_with("setting object: 0 would leave"),
+            "{refused}"
+        );
+        let refused = kept.refit_mesh(gpu, &turned, 0, &shape(1e-20)).unwrap_err();
+        assert!(refused.to_string().contains("instances[0].transform"), "{refused}");
+        assert_eq!(kept.index_work(), work, "what is refused makes nothing");
+        kept.refit_mesh(gpu, &turned, 0, &shape(0.999)).unwrap();
     });
 }
 

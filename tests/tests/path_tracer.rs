@@ -564,7 +564,7 @@ fn metal_floors_under_a_sky_reflect_by_the_form_they_name() {
         ] {
             let scene = floor_of(Material {
                 roughness: 0.6,
-                microfacets: Some(Microfacets { distribution, geometry }),
+                classic_microfacets: Some(Microfacets { distribution, geometry }),
                 ..Material::mirror("floor", Vec3::ONE)
             });
             let b = Bsdf::from_material(&scene.materials[0]);

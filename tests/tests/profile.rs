@@ -129,7 +129,7 @@ fn features_are_those_of_the_scene() {
             (
                 "exact",
                 metal_of(FresnelForm::Exact),
-                &["has_metal", "has_conductor", "has_multiple_scattering"],
+                &["has_metal", "has_exact_conductor", "has_multiple_scattering"],
             ),
             (
                 "rescaled",
@@ -155,10 +155,10 @@ fn features_are_those_of_the_scene() {
                 "classical",
                 {
                     let mut scene = metal_of(FresnelForm::Exact);
-                    scene.materials[0].microfacets = Some(Microfacets::default());
+                    scene.materials[0].classic_microfacets = Some(Microfacets::default());
                     scene
                 },
-                &["has_metal", "has_conductor", "has_classic_microfacets"],
+                &["has_metal", "has_exact_conductor", "has_classic_microfacets"],
             ),
             ("lamp", lamp, &["has_area_lights"]),
             ("sun", sun, &["has_punctual_lights"]),
@@ -313,7 +313,7 @@ fn with_everything(mut scene: Scene) -> Scene {
     point_triangle(&mut scene, Material::phong("phong", Vec3::splat(0.5), 0.5, 20.0), place);
     let classic = Material {
         conductor: metals::by_name("copper"),
-        microfacets: Some(Microfacets::default()),
+        classic_microfacets: Some(Microfacets::default()),
         ..Material::default()
     };
     point_triangle(&mut scene, classic, place);
@@ -359,7 +359,7 @@ fn features_that_are_compiled_in_without_need_change_no_bit() {
             let compiled = features(&full_tracer.pipelines());
             for feature in [
                 "has_metal",
-                "has_conductor",
+                "has_exact_conductor",
                 "has_schlick_conductor",
                 "has_compensated_conductor",
                 "has_tinted_conductor",

@@ -79,6 +79,7 @@ fn pairs_fill_the_square_evenly() {
             ("sobol over pixels", SamplerKind::Sobol, false),
             ("pcg over pixels", SamplerKind::Pcg, false),
             ("pcg over samples", SamplerKind::Pcg, true),
+            ("joint sobol over pixels", SamplerKind::JointSobol, false),
         ] {
             let points = pairs(gpu, kind, 4, one_pixel);
             assert!(points.iter().flatten().all(|x| (0.0..1.0).contains(x)), "{what}");

@@ -5,8 +5,8 @@ use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::trace::{Execution, PersistentThreads, Query, RayTracer, TraceSettings};
 use clerestory::accel::wide::{LEAF_SIZE, WideBuilder, WideBvh, WideRefitter, WideSettings, refit};
-use clerestory::accel::{Ray, RayIndex};
-use clerestory::gpu::DeviceKind;
+use clerestory::accel::{Hit, Ray, RayIndex};
+use clerestory::gpu::{Access, Buffer, BufferDesc, Category, DeviceKind};
 use clerestory_hard_cases::{hit_bits, misses, soup_with_rays};
 use clerestory_tests::random::Random;
 use clerestory_tests::render::builtin;
@@ -273,18 +273,36 @@ fn a_build_and_rays_go_into_one_submission() {
         let indices: Vec<u32> = (0..count).collect();
         gpu.upload(&binary.corners, 0, &triangles).unwrap();
         gpu.upload(&binary.indices, 0, &indices).unwrap();
-        let mut recorder = gpu.recorder("wide").unwrap();
-        builder.record(&mut recorder, &binary, &buffers).unwrap();
-        recorder.submit().unwrap().wait().unwrap();
         let host = WideBvh::build(&triangles, &of_device).unwrap();
         let asked = settings(Query::Closest, QUOTA).fitted(gpu.caps(), host.device_traversal());
         let tracer = RayTracer::with_texels(gpu, buffers.texels.clone(), host.device_traversal(), &asked).unwrap();
-        let hits = tracer.trace(&rays).unwrap().hits;
+        let traced = tracer.buffers(rays.len() as u32).unwrap();
+        gpu.upload(&traced.rays, 0, &rays).unwrap();
+        let there = buffers.texels.buffer();
+        let copied = BufferDesc::storage("copy", there.bytes(), Category::Index);
+        let copied = gpu.buffer(&copied).unwrap();
+        let mut recorder = gpu.recorder("wide").unwrap();
+        // The second build begins where copies and rays may read what the first has left.
+        for _ in 0..2 {
+            builder.record(&mut recorder, &binary, &buffers).unwrap();
+            let copy = recorder.pass("copy", |pass| {
+                pass.memory_barrier(Access::TRANSFER, Access::TRANSFER);
+                pass.copy(there.view(), copied.view())
+            });
+            copy.unwrap();
+            tracer.record(&mut recorder, &traced, 1).unwrap();
+        }
+        recorder.submit().unwrap().wait().unwrap();
+        assert_eq!(tracer.unfinished(&traced).unwrap(), 0);
+        let hits: Vec<Hit> = gpu.read(traced.hits.view(), rays.len()).unwrap();
+        assert!(hits.iter().any(Hit::is_hit));
         for (ray, hit) in rays.iter().zip(&hits) {
             assert!(!misses(&triangles, ray, hit), "{ray:?}");
         }
-        let texels: Vec<[u32; 4]> = gpu.read(buffers.texels.buffer().view(), host.texels().len()).unwrap();
-        assert!(texels == host.texels());
+        for buffer in [there, &copied] {
+            let texels: Vec<[u32; 4]> = gpu.read(buffer.view(), host.texels().len()).unwrap();
+            assert!(texels == host.texels());
+        }
         let few = builder.buffers(count - 1).unwrap();
         let mut recorder = gpu.recorder("wide").unwrap();
         assert!(builder.record(&mut recorder, &binary, &few).is_err());
@@ -306,6 +324,35 @@ fn moved(triangles: &[[Vec3; 3]], random: &mut Random) -> Vec<[Vec3; 3]> {
         }
     }
     triangles
+}
+
+#[test]
+fn refits_follow_copies_in_one_submission() {
+    with_gpu(|gpu| {
+        let (triangles, _) = soup();
+        let refitter = WideRefitter::new(gpu).unwrap();
+        let before = WideBvh::build(&triangles, &WideSettings::default()).unwrap();
+        let there = refitter.upload(&before).unwrap();
+        let moved = moved(&triangles, &mut Random(55));
+        let mut corners = moved.clone();
+        for triangle in &mut corners {
+            if triangle[0] == triangle[1] {
+                *triangle = [triangle[0]; 3];
+            }
+        }
+        gpu.upload(&there.corners, 0, &corners).unwrap();
+        let texels = there.texels.buffer();
+        let copied = BufferDesc::storage("copy", texels.bytes(), Category::Index);
+        let copied = gpu.buffer(&copied).unwrap();
+        let mut recorder = gpu.recorder("wide refit").unwrap();
+        let copy = recorder.pass("copy", |pass| pass.copy(texels.view(), copied.view()));
+        copy.unwrap();
+        refitter.record(&mut recorder, &there).unwrap();
+        recorder.submit().unwrap().wait().unwrap();
+        let read = |buffer: &Buffer| -> Vec<[u32; 4]> { gpu.read(buffer.view(), before.texels().len()).unwrap() };
+        assert!(read(&copied) == before.texels());
+        assert!(read(texels) == refit(&before, &moved).unwrap().texels());
+    });
 }
 
 #[test]

@@ -95,7 +95,9 @@ impl Surface {
                         material.fresnel
                     ));
                 }
-                _ if material.microfacets.is_some() => return Err("classical microfacets are not exported".into()),
+                _ if material.classic_microfacets.is_some() => {
+                    return Err("classical microfacets are not exported".into());
+                }
                 Some(conductor) => Self::Conductor {
                     eta: conductor.eta,
                     k: conductor.k,

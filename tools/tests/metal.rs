@@ -61,6 +61,9 @@ fn spectra_come_from_files_and_spheres_go_into_them() {
         (&["mithril"][..], "gold"),
         (&["gold", "--form", "quick"][..], "f82-tint"),
         (&["gold", "--wavelengths", "700,550,0"][..], "above 0"),
+        (&["gold", "--wavelengths", "0.7,0.55,0.435"][..], "micrometres"),
+        (&[spectrum, "--wavelengths", "700,550,370"][..], "370 nm is outside"),
+        (&["gold", "--form", "hoffman"][..], "--sphere"),
         (&[picture][..], "UTF-8"),
     ] {
         let output = run(arguments);

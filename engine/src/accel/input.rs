@@ -31,7 +31,7 @@ fn classify(triangle: &[Vec3; 3]) -> Usability {
 }
 
 /// Whether rays can meet a triangle: in range, and of an area in f64.
-pub(super) fn can_be_met(triangle: &[Vec3; 3]) -> bool {
+pub(crate) fn can_be_met(triangle: &[Vec3; 3]) -> bool {
     matches!(classify(triangle), Usability::Yes)
 }
 

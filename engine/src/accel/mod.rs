@@ -51,6 +51,7 @@ mod test_support;
 
 pub use aabb::Aabb;
 pub use device_traversal::DeviceTraversal;
+pub(crate) use input::can_be_met;
 pub use kind::{IndexBinding, IndexKept, IndexKind, IndexOnDevice, IndexReport};
 pub use leaf_rule::LeafRule;
 pub use stages::BuildStages;
@@ -150,7 +151,7 @@ pub struct IndexStatistics {
     pub excluded_range: u64,
     /// Triangles left out since their area is zero.
     pub excluded_degenerate: u64,
-    /// Inner nodes.
+    /// Inner nodes; in two levels with the places for nodes over the instances.
     pub nodes: u64,
     /// Leaves that hold triangles.
     pub leaves: u64,

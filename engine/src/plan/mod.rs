@@ -84,7 +84,7 @@ pub struct Candidate {
     pub variant: &'static str,
     /// Settings as JSON.
     pub settings: Value,
-    /// Why it cannot be chosen, tried or not; empty for those that can.
+    /// Why it cannot be chosen, tried or not, or, where its bias exceeds the error asked for, comes behind all that reach it; empty for the others.
     pub reason: String,
     /// What of the light paths asked for it does not find, in words; empty where it finds all.
     pub misses: String,

@@ -3,7 +3,7 @@
 //! Readers and generators end with it, and a host that builds a [`Scene`] itself should too: what passes cannot make an upload or a
 //! traversal read outside its buffers.
 
-use super::{Camera, FresnelForm, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
+use super::{Camera, ConductorIor, FresnelForm, LightKind, Material, Mesh, Projection, Scene, Texture, medium};
 use crate::{Error, Result};
 
 /// Greatest number of triangles that all instances together may place: hits name each by a number of 32 bits, the last of which names none. What a device
@@ -118,9 +118,11 @@ impl Scene {
     }
 }
 
-type Fault = (String, String);
+/// Where, and what is wrong there.
+pub(crate) type Fault = (String, String);
 
-fn check_mesh(mesh: &Mesh, materials: usize) -> Result<(), Fault> {
+/// Whether a mesh's indices, lengths and numbers are sound, of a scene with so many materials.
+pub(crate) fn check_mesh(mesh: &Mesh, materials: usize) -> Result<(), Fault> {
     let n = mesh.positions.len();
     if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
         return Err((
@@ -222,22 +224,27 @@ fn check_material(material: &Material, images: usize) -> Result<(), Fault> {
     color("specular_color", material.specular_color)?;
     color("attenuation_color", material.attenuation_color)?;
     if let Some(conductor) = material.conductor {
-        color("conductor.eta", conductor.eta)?;
-        color("conductor.k", conductor.k)?;
-        if conductor.eta.min_element() <= 0.0 {
-            return Err(("conductor.eta".into(), "must be above 0".into()));
+        if !conductor.is_in_range() {
+            let [least, greatest] = ConductorIor::ETA;
+            let cause = format!(
+                "eta {} is not in [{least}, {greatest}], or k {} not in [0, {}]",
+                conductor.eta,
+                conductor.k,
+                ConductorIor::K_MAX
+            );
+            return Err(("conductor".into(), cause));
         }
     } else if material.fresnel != FresnelForm::Exact {
         return Err(("fresnel".into(), format!("{} needs a conductor", material.fresnel)));
     }
-    if material.microfacets.is_some() {
+    if material.classic_microfacets.is_some() {
         let sound = material.metallic == 1.0
             && material.metallic_roughness_texture.is_none()
             && material.transmission == 0.0
             && !material.phong;
         if !sound {
             return Err((
-                "microfacets".into(),
+                "classic_microfacets".into(),
                 "are those of a metal: metallic 1 without a texture of it, no transmission, no modified Phong model"
                     .into(),
             ));
@@ -348,6 +355,21 @@ mod tests {
         assert!(refusal(|s| s.materials[0].roughness = f32::NAN).contains("roughness"));
         assert!(refusal(|s| s.materials[0].emission.x = -1.0).contains("emission"));
         assert!(refusal(|s| s.images.clear()).contains("image 0 is out of range"));
+        for (eta, k) in [
+            (1e-7, 1.0),
+            (2e6, 1.0),
+            (f32::NAN, 1.0),
+            (1.0, -1.0),
+            (1.0, 2e6),
+            (1.0, f32::INFINITY),
+        ] {
+            let ior = |eta, k| ConductorIor {
+                eta: glam::Vec3::new(1.0, eta, 1.0),
+                k: glam::Vec3::new(1.0, 1.0, k),
+            };
+            let refused = refusal(|s| s.materials[0].conductor = Some(ior(eta, k)));
+            assert!(refused.contains("conductor"), "{eta} {k}: {refused}");
+        }
         assert!(refusal(|s| s.cameras[0].projection = Projection::Perspective { fov_y: 0.0 }).contains("cameras[0]"));
         assert!(
             refusal(|s| {

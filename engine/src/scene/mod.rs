@@ -217,6 +217,21 @@ pub struct ConductorIor {
     pub k: Vec3,
 }
 
+impl ConductorIor {
+    /// Least and greatest real part: products of four of them and of extinctions are numbers of f32.
+    pub const ETA: [f32; 2] = [1e-6, 1e6];
+    /// Greatest extinction coefficient.
+    pub const K_MAX: f32 = 1e6;
+
+    /// Whether real parts lie in [`Self::ETA`], and extinctions from 0 to [`Self::K_MAX`].
+    pub fn is_in_range(&self) -> bool {
+        let [least, greatest] = Self::ETA.map(Vec3::splat);
+        // NaN is nowhere.
+        let eta = self.eta.cmpge(least).all() && self.eta.cmple(greatest).all();
+        eta && self.k.cmpge(Vec3::ZERO).all() && self.k.cmple(Vec3::splat(Self::K_MAX)).all()
+    }
+}
+
 /// A surface material: glTF 2.0 metallic-roughness with its `KHR_materials_*` extensions, measured metals, and the modified Phong model.
 #[derive(Debug, Clone)]
 pub struct Material {
@@ -272,7 +287,7 @@ pub struct Material {
     pub fresnel: FresnelForm,
     /// Classical microfacets in place of GGX under Smith's masking (sidecar only), for a metal alone: metallic must be 1, without a texture of it and without
     /// transmission and the modified Phong model.
-    pub microfacets: Option<Microfacets>,
+    pub classic_microfacets: Option<Microfacets>,
     /// The metal is a modified Phong lobe of reflectance `base_color` (sidecar only): base colour · (metallic · Phong + (1 − metallic) ·
     /// Lambert). Its exponent is (1/α² − 1)/2 with α = roughness², that of a lobe about as wide as GGX's of this α. Only without
     /// transmission, conductor and specular layer: each of them is an error.
@@ -323,7 +338,7 @@ impl Default for Material {
             boundary: false,
             conductor: None,
             fresnel: FresnelForm::Exact,
-            microfacets: None,
+            classic_microfacets: None,
             phong: false,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,

@@ -143,7 +143,7 @@ pub struct SceneProfile {
     /// Some metal has a complex index of refraction.
     pub has_conductor: bool,
     /// Some metal's Fresnel factor has another form than the exact one.
-    pub has_fitted_conductor: bool,
+    pub has_other_conductor: bool,
     /// Some metal has classical microfacets.
     pub has_classic_microfacets: bool,
     /// Some metal is a modified Phong lobe.
@@ -230,7 +230,7 @@ impl SceneProfile {
             environment: environment_use(scene),
             has_metal: false,
             has_conductor: false,
-            has_fitted_conductor: false,
+            has_other_conductor: false,
             has_classic_microfacets: false,
             has_phong: false,
             has_rough_dielectric_spec: false,
@@ -327,8 +327,8 @@ impl SceneProfile {
         self.has_metal |= metallic[1] > 0.0;
         let conductor = metallic[1] > 0.0 && material.conductor.is_some();
         self.has_conductor |= conductor;
-        self.has_fitted_conductor |= conductor && material.fresnel != FresnelForm::Exact;
-        self.has_classic_microfacets |= material.microfacets.is_some();
+        self.has_other_conductor |= conductor && material.fresnel != FresnelForm::Exact;
+        self.has_classic_microfacets |= material.classic_microfacets.is_some();
         self.has_phong |= metallic[1] > 0.0 && material.phong;
         self.has_rough_dielectric_spec |= reflects;
         if transmits {
@@ -445,7 +445,7 @@ impl fmt::Display for SceneProfile {
             ("shading normals", self.has_shading_normals),
             ("metal", self.has_metal),
             ("measured metal", self.has_conductor),
-            ("metal by a form of its Fresnel factor", self.has_fitted_conductor),
+            ("metal by a form of its Fresnel factor", self.has_other_conductor),
             ("classical microfacets", self.has_classic_microfacets),
             ("modified Phong", self.has_phong),
             ("dielectric reflection", self.has_rough_dielectric_spec),

@@ -42,7 +42,8 @@ pub fn fresnel_dielectric(cos_i: f64, eta: f64) -> f64 {
     (0.5 * a * a * (1.0 + b * b)).min(1.0)
 }
 
-/// What keeps the one case of 0/0 defined: no interface (η = 1, k = 0) at a cosine of 0, which reflects nothing.
+/// What keeps the cases of 0/0 defined: no interface (η = 1, k = 0) at a cosine of 0, which reflects nothing, and an index too small for its square at a
+/// cosine of 1.
 const LEAST_SUM: f64 = constants::LEAST_SUM as f64;
 
 /// Exact conductor against vacuum, per band; complex index `eta` + i `k`.
@@ -60,7 +61,7 @@ pub fn fresnel_conductor(cos_i: f64, eta: DVec3, k: DVec3) -> DVec3 {
     let rs = (sum - cross_s) / (sum + cross_s + LEAST_SUM);
     let sum_p = c2 * a2b2 + s2 * s2;
     let cross_p = cross_s * s2;
-    let rp = rs * (sum_p - cross_p) / (sum_p + cross_p);
+    let rp = rs * (sum_p - cross_p) / (sum_p + cross_p + LEAST_SUM);
     (0.5 * (rs + rp)).clamp(DVec3::ZERO, DVec3::ONE)
 }
 
@@ -104,6 +105,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/transport/fresnel.rs::conductor_without_extinction_is_the_dielectric",
             "engine/src/transport/fresnel.rs::conductors_agree_with_the_complex_form",
+            "engine/src/transport/fresnel.rs::conductors_are_finite_at_the_ends_of_their_range",
             "engine/src/transport/fresnel.rs::conductors_reflect_as_published",
             "engine/src/transport/fresnel.rs::curves_dip_where_published",
             "tests/tests/twins/fresnel_forms.rs::the_conductor_in_single_precision_is_the_complex_form",
@@ -214,6 +216,21 @@ mod tests {
             [epsilon[0] * c + a, epsilon[1] * c + b],
         );
         0.5 * (s + p)
+    }
+
+    #[test]
+    fn conductors_are_finite_at_the_ends_of_their_range() {
+        for eta in [0.0, 1e-25, 1e-6, 1.0, 1e6] {
+            for k in [0.0, 1e6] {
+                for c in [0.0, 1e-6, 0.5, 1.0] {
+                    let f = fresnel_conductor(c, DVec3::splat(eta), DVec3::splat(k));
+                    assert!(
+                        f.is_finite() && f.min_element() >= 0.0 && f.max_element() <= 1.0,
+                        "{eta} {k} {c}: {f}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -63,7 +63,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     role: Role::PartOf("BG-3"),
     limits: "A modified Phong lobe stands in place of a metal's, on a base without coat or transmission; the preview refuses it.",
     sources: &[sources::LAFORTUNE_WILLEMS_1994.whole(), sources::WALTER_2007.whole()],
-    shaders: &["shaders/transport/phong.glsl"],
+    shaders: &["shaders/transport/phong.glsl", "shaders/transport/below_one.glsl"],
     bias: Some(Bias::Unbiased),
     tests: &[
         "engine/src/transport/phong.rs::white_furnace",

@@ -24,8 +24,9 @@ pub enum SamplerKind {
     Sobol = SAMPLER_SOBOL,
     /// Independent hashes.
     Pcg = SAMPLER_PCG,
-    /// The first eight slots jointly stratified by one Owen-scrambled Sobol' sequence of sixteen dimensions (pixel, lens, and the first two
-    /// bounces), the others as with [`SamplerKind::Sobol`].
+    /// The first eight slots jointly stratified by one Owen-scrambled Sobol' sequence of sixteen dimensions, the others as with
+    /// [`SamplerKind::Sobol`]: of eye paths pixel, lens, and the first two bounces; of photons their point and direction on the light, and the first
+    /// bounces. Runs of 2¹⁶ = 65,536 samples of a stream are jointly even each by itself; what photons of a larger pass gain ends there.
     JointSobol = SAMPLER_JOINT_SOBOL,
 }
 
@@ -345,7 +346,7 @@ mod tests {
             }
         }
         assert!(worst.is_empty(), "{worst:?}");
-        for kind in [SamplerKind::Sobol, SamplerKind::Pcg] {
+        for kind in [SamplerKind::Sobol, SamplerKind::Pcg, SamplerKind::JointSobol] {
             let n = 1 << 16;
             let mut sum = DVec2::ZERO;
             for i in 0..n {

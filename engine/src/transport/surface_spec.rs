@@ -12,7 +12,7 @@ macro_rules! surface_spec {
         let (profile, bsdf) = ($scene.profile(), $scene.bsdf_features());
         $shader::Spec {
             has_metal: bsdf.metal,
-            has_conductor: bsdf.conductor,
+            has_exact_conductor: bsdf.exact_conductor,
             has_schlick_conductor: bsdf.schlick_conductor,
             has_compensated_conductor: bsdf.compensated_conductor,
             has_tinted_conductor: bsdf.tinted_conductor,
@@ -39,7 +39,7 @@ pub use surface_spec;
 pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 27] = [
     ("has_metal", METAL_LOBES, "no material is metal"),
     (
-        "has_conductor",
+        "has_exact_conductor",
         "exact conductors",
         "no metal has a complex index of refraction and the exact form",
     ),

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use clerestory::gpu::Gpu;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{
-    BSDF_CONDUCTOR, Bsdf, BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
-    LOBE_SPECULAR, LOBE_TRANSMISSION, bsdf_gltf, bsdf_pdf,
+    BSDF_EXACT_CONDUCTOR, Bsdf, BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, LOBE_DIFFUSE, LOBE_GLOSSY,
+    LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION, bsdf_gltf, bsdf_pdf,
 };
 use clerestory::transport::fresnel::{fresnel_conductor_average, fresnel_dielectric};
 use clerestory::transport::phase::{henyey_greenstein, schlick_phase};
@@ -158,7 +158,7 @@ const CONDUCTOR: [DVec3; 2] = [DVec3::new(0.2, 0.4, 1.4), DVec3::new(4.0, 2.4, 1
 
 impl Surface {
     fn flags(&self) -> u32 {
-        if self.conductor { BSDF_CONDUCTOR } else { 0 }
+        if self.conductor { BSDF_EXACT_CONDUCTOR } else { 0 }
     }
 
     fn bsdf(&self) -> Bsdf {
@@ -174,9 +174,9 @@ impl Surface {
         });
         let [eta, k] = CONDUCTOR;
         Bsdf {
-            conductor_eta: eta,
-            conductor_k: k,
-            conductor_average: fresnel_conductor_average(eta, k),
+            conductor_a: eta,
+            conductor_b: k,
+            conductor_c: fresnel_conductor_average(eta, k),
             flags: b.flags | self.flags(),
             ..b
         }

@@ -102,6 +102,21 @@ fn the_conductor_in_single_precision_is_the_complex_form() {
         }
         assert!(worst < 1e-6, "{worst:e}");
         println!("conductors: {worst:.2e}");
+        // The ends of the range of indices, and beyond them nothing that is no number.
+        let ends = [1e-25f32, 1e-6, 1e6].map(|eta| [0.0, 1e6].map(|k| [0.0, 1e-3, 0.5, 1.0].map(|c| (c, eta, k))));
+        let ends: Vec<Case> = (ends.as_flattened().as_flattened().iter())
+            .map(|&(c, eta, k)| Case::new(&[c, 1.0, eta, eta, eta, k, k, k]))
+            .collect();
+        for (case, result) in ends.iter().zip(&twin_math(gpu, 2, &ends, &[])) {
+            let (x, found) = (case.0.map(f64::from), result.vector(5));
+            assert!(found.is_finite(), "{:?}", case.0);
+            let exact = fresnel_conductor(x[0], v3(&x, 2), v3(&x, 5));
+            assert!(
+                x[2] < 1e-6 * 0.99 || (found - exact).abs().max_element() < 1e-5,
+                "{:?}: {found} {exact}",
+                case.0
+            );
+        }
         // No interface reflects nothing, at a cosine of 0 too; just above it the root of what rounding leaves of 1 − 1 is all there is.
         let nothing = [0.0, 0.01, 0.5, 1.0].map(|c| Case::new(&[c, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]));
         for result in twin_math(gpu, 2, &nothing, &[]) {

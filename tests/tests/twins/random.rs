@@ -25,8 +25,8 @@ fn random_numbers_are_equal_bit_for_bit() {
             .map(|i| RandomCase {
                 pixel: if i < 4096 { 5 } else { word() },
                 sample_index: if i < 4096 { i } else { word() },
-                // The slots of a joint sequence are the first eight.
-                dimension: if i < 4096 { i % 16 } else { word() },
+                // The slots of a joint sequence are the first eight: with indices of all bits, too.
+                dimension: if i < 8192 { i % 16 } else { word() },
                 seed: if i < 4096 { 7 } else { word() },
             })
             .collect();

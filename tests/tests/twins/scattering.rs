@@ -3,7 +3,7 @@
 use clerestory::scene::FresnelForm;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{
-    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_PHONG,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_PHONG,
     BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext,
     BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf, bsdf_sample,
 };
@@ -65,7 +65,7 @@ fn the_scattering_function_agrees_with_its_twin() {
                 ]);
                 let (parameters, flags) = match kind.checked_sub(3) {
                     Some(form) => forms[form],
-                    None => (exact, [0, BSDF_CONDUCTOR, BSDF_PHONG][kind]),
+                    None => (exact, [0, BSDF_EXACT_CONDUCTOR, BSDF_PHONG][kind]),
                 };
                 all.extend(parameters.iter().flat_map(|v| v.as_vec3().to_array()));
                 // Classical microfacets are those of whole metals.
@@ -108,9 +108,9 @@ fn the_scattering_function_agrees_with_its_twin() {
                 thickness: x[11],
             });
             Bsdf {
-                conductor_eta: v3(x, 12),
-                conductor_k: v3(x, 15),
-                conductor_average: v3(x, 18),
+                conductor_a: v3(x, 12),
+                conductor_b: v3(x, 15),
+                conductor_c: v3(x, 18),
                 flags: b.flags | (x[21] as f32).to_bits(),
                 ..b
             }

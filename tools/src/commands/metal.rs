@@ -36,7 +36,7 @@ Scenes name a form in their sidecar: [metals] ring = { metal = \"gold\", fresnel
 pub struct Arguments {
     /// A metal's name, or a file with its spectrum
     metal: String,
-    /// Three wavelengths, in nanometres, in the place of the means over the red, green and blue channels
+    /// Three wavelengths, in nanometres, within the metal's samples, in the place of the means over the red, green and blue channels
     #[arg(long, value_name = "R,G,B", value_parser = wavelengths)]
     wavelengths: Option<[f64; 3]>,
     /// Also times each form on the device
@@ -46,7 +46,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.png")]
     sphere: Option<PathBuf>,
     /// The form of the spheres' lower halves
-    #[arg(long, default_value = "rescaled", value_parser = form)]
+    #[arg(long, default_value = "rescaled", requires = "sphere", value_parser = form)]
     form: FresnelForm,
     /// Prints JSON
     #[arg(long)]
@@ -144,7 +144,10 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     };
     let spectrum = spectrum(&arguments.metal)?;
     let ior = match arguments.wavelengths {
-        Some(wavelengths) => spectrum.at_wavelengths(wavelengths),
+        Some(wavelengths) => {
+            check_wavelengths(&spectrum, wavelengths)?;
+            spectrum.at_wavelengths(wavelengths)
+        }
         None => spectrum.channels(),
     };
     let shown = Shown {
@@ -186,6 +189,21 @@ fn spectrum(metal: &str) -> Outcome<IndexSpectrum> {
     };
     let text = read_text(Path::new(metal), FILE_MAX).map_err(|error| failed(error.to_string()))?;
     IndexSpectrum::parse(&text).map_err(|cause| failed(format!("{metal}: {cause}")))
+}
+
+/// Refuses wavelengths of which a spectrum knows nothing.
+fn check_wavelengths(spectrum: &IndexSpectrum, wavelengths: [f64; 3]) -> Outcome<()> {
+    let [first, last] = spectrum.range();
+    let Some(outside) = wavelengths.into_iter().find(|w| !(first..=last).contains(w)) else {
+        return Ok(());
+    };
+    Err(Failure {
+        // As for files.
+        hint: (outside < 100.0).then(|| "wavelengths are in nanometres; this looks like micrometres".into()),
+        ..Failure::usage(format!(
+            "--wavelengths: {outside} nm is outside of the metal's samples, from {first} to {last} nm"
+        ))
+    })
 }
 
 fn of_band(ior: &ConductorIor, i: usize, band: &'static str) -> Band {

@@ -106,7 +106,7 @@ fn metal(material: &Material, alpha: f32) -> Result<String, String> {
                 material.fresnel
             ));
         }
-        _ if material.microfacets.is_some() => return Err("classical microfacets are not exported".into()),
+        _ if material.classic_microfacets.is_some() => return Err("classical microfacets are not exported".into()),
         Some(conductor) => rgb("eta", conductor.eta) + &rgb("k", conductor.k),
         // Schlick's factor with F0 = 1 is 1 at every angle.
         None if material.base_color.truncate() == Vec3::ONE => "<string name=\"material\" value=\"none\"/>".into(),

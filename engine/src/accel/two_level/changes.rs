@@ -30,7 +30,7 @@ impl TwoLevelBvh {
         };
         let mut nodes = top.nodes;
         nodes.resize(capacity, WideNode::zeroed());
-        let mut walk = capacity as u32;
+        let mut first_node = capacity as u32;
         let mut records = Vec::with_capacity(boxes.len());
         for (i, (placement, transform)) in self.placements.iter().zip(&self.transforms).enumerate() {
             let mesh = &self.meshes[placement.mesh as usize];
@@ -52,11 +52,11 @@ impl TwoLevelBvh {
                 x: transform.rows[0],
                 first: if mesh.has_names { 0 } else { placement.first },
                 y: transform.rows[1],
-                walk,
+                first_node,
                 z: transform.rows[2],
                 place,
             });
-            walk += mesh.nodes;
+            first_node += mesh.nodes;
         }
         self.texels[..HEADER_TEXELS].copy_from_slice(&bytemuck::cast::<Header, [[u32; 4]; HEADER_TEXELS]>(header));
         let top_end = HEADER_TEXELS + NODE_TEXELS * capacity;
@@ -67,7 +67,7 @@ impl TwoLevelBvh {
         self.statistics = self.measured(&top.bounds, top.area, top.depth);
     }
 
-    /// Counts over all instances, but nodes, leaves and bytes as they are stored; the cost with that of each mesh's tree below its instances.
+    /// Counts over all instances, but nodes, leaves and bytes as they are stored, nodes with the places over the instances; the cost with that of each mesh's tree below its instances.
     fn measured(&self, bounds: &Aabb, area: f64, depth: u32) -> IndexStatistics {
         let root = bounds.half_area();
         let mut all = IndexStatistics {

@@ -21,7 +21,7 @@ use super::bvh2::Bvh2Triangle;
 use super::stages::Stopwatch;
 use super::wide::{WideBvh, WideNode, WideSettings};
 use super::{
-    Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, Ray, RayIndex, TraversalCounters,
+    Aabb, BuildStages, CandidateFilter, DeviceTraversal, Hit, IndexStatistics, NO_HIT, Ray, RayIndex, TraversalCounters,
 };
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants;
@@ -91,7 +91,7 @@ pub(super) struct InstanceRecord {
     pub first: u32,
     pub y: Vec3,
     /// Number of the mesh's root among the nodes of all instances, by which stopped rays are known.
-    pub walk: u32,
+    pub first_node: u32,
     pub z: Vec3,
     /// Its place among the nodes of the tree above.
     pub place: u32,
@@ -102,7 +102,7 @@ pub(super) struct InstanceRecord {
 pub struct MeshGeometry<'a> {
     /// Its triangles, in its own space.
     pub triangles: &'a [[Vec3; 3]],
-    /// How hits name each of them, where it isn't by its place: only for a mesh that is placed once.
+    /// How hits name each of them, where it isn't by its place, by numbers below 2³² − 1: only for a mesh that is placed once.
     pub names: Option<&'a [u32]>,
 }
 
@@ -187,9 +187,9 @@ impl TwoLevelBvh {
     ///
     /// # Errors
     /// [`Error::Setting`] for settings out of range, for a placement of a mesh that does not exist or by a transform that rays cannot be traced
-    /// through ([`InstanceTransform::of`]), and for a mesh with names that is placed more than once; [`Error::LimitExceeded`] for more than
-    /// [`MAX_INSTANCES`], for triangles whose numbers are not below 2³² − 1, and for more nodes than numbers of 32 bits tell apart over all
-    /// instances.
+    /// through ([`InstanceTransform::of`]), and for a mesh with names that is placed more than once, has another number of names than of triangles, or
+    /// a name that is not below 2³² − 1; [`Error::LimitExceeded`] for more than [`MAX_INSTANCES`], for triangles whose numbers are not below 2³² − 1,
+    /// and for more nodes than numbers of 32 bits tell apart over all instances.
     pub fn build(meshes: &[MeshGeometry<'_>], placements: &[Placement], settings: &WideSettings) -> Result<Self> {
         let top = top::capacity(placements.len());
         check_limit(
@@ -197,6 +197,7 @@ impl TwoLevelBvh {
             placements.len() as u64,
             MAX_INSTANCES as u64,
         )?;
+        check_names(meshes)?;
         let trees = meshes
             .iter()
             .map(|mesh| WideBvh::build(mesh.triangles, settings))
@@ -273,15 +274,10 @@ impl TwoLevelBvh {
         Ok(built)
     }
 
-    /// Whether an instance of a mesh in that box can be placed so ([`InstanceTransform::of`]).
-    pub fn can_place(bounds: &Aabb, transform: &DAffine3) -> bool {
-        InstanceTransform::of(transform, &[[bounds.lower.as_dvec3(), bounds.upper.as_dvec3()]]).is_some()
-    }
-
     /// Refuses placements whose triangles or nodes have no numbers.
     fn check_numbers(&self) -> Result<()> {
         let mut named = vec![false; self.meshes.len()];
-        let mut walk = top::capacity(self.placements.len()) as u64;
+        let mut nodes = top::capacity(self.placements.len()) as u64;
         for (i, placement) in self.placements.iter().enumerate() {
             let Some(mesh) = self.meshes.get(placement.mesh as usize) else {
                 return Err(Error::setting(
@@ -298,12 +294,16 @@ impl TwoLevelBvh {
             let triangles = statistics.triangles + statistics.excluded_range + statistics.excluded_degenerate;
             let end = u64::from(placement.first) + triangles;
             check_limit("triangles of all instances", end, u64::from(u32::MAX))?;
-            walk += u64::from(mesh.nodes);
+            nodes += u64::from(mesh.nodes);
         }
-        check_limit("nodes of all instances", walk, u64::from(u32::MAX))
+        check_limit("nodes of all instances", nodes, u64::from(u32::MAX))
     }
 
-    fn transform(&self, placement: usize, transform: &DAffine3) -> Result<InstanceTransform> {
+    /// What a transform would make of a placement that exists.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for one that rays cannot be traced through.
+    pub(crate) fn transform(&self, placement: usize, transform: &DAffine3) -> Result<InstanceTransform> {
         let mesh = &self.meshes[self.placements[placement].mesh as usize];
         InstanceTransform::of(transform, &mesh.parts).ok_or_else(|| {
             let cause = "is not a transform that rays can be traced through";
@@ -364,6 +364,13 @@ impl TwoLevelBvh {
         ]
     }
 
+    /// Corners of the triangles that rays can meet in the mesh of a placement that exists, in the mesh's own space.
+    pub(crate) fn corners_at(&self, placement: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        let mesh = &self.meshes[self.placements[placement].mesh as usize];
+        let triangles = &self.triangles()[mesh.first_triangle as usize..][..mesh.triangles as usize];
+        triangles.iter().map(|triangle| triangle.corners)
+    }
+
     fn header(&self) -> Header {
         bytemuck::cast([self.texels[0], self.texels[1], self.texels[2]])
     }
@@ -386,6 +393,22 @@ impl TwoLevelBvh {
     fn triangles(&self) -> &[Bvh2Triangle] {
         bytemuck::cast_slice(&self.texels[self.instance_texels().end..])
     }
+}
+
+/// Refuses names that are not one a triangle, and that which stands for no triangle.
+fn check_names(meshes: &[MeshGeometry<'_>]) -> Result<()> {
+    for (i, mesh) in meshes.iter().enumerate() {
+        let Some(names) = mesh.names else { continue };
+        if names.len() != mesh.triangles.len() {
+            let cause = format!("are not one for each of {} triangles", mesh.triangles.len());
+            return Err(Error::setting(format!("meshes[{i}].names"), names.len(), cause));
+        }
+        if let Some(place) = names.iter().position(|name| *name == NO_HIT) {
+            let cause = "stands for no triangle";
+            return Err(Error::setting(format!("meshes[{i}].names[{place}]"), NO_HIT, cause));
+        }
+    }
+    Ok(())
 }
 
 fn check_limit(name: &str, value: u64, limit: u64) -> Result<()> {
@@ -458,11 +481,14 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/two_level/tests.rs::moving_makes_the_tree_above_and_nothing_else",
         "engine/src/accel/two_level/tests.rs::refitted_meshes_have_the_hits_of_new_ones",
         "engine/src/accel/two_level/tests.rs::bytes_grow_with_meshes_and_little_with_instances",
+        "engine/src/accel/two_level/tests.rs::names_that_no_hit_could_have_are_refused",
+        "engine/src/transport/gpu_scene/kept/tests.rs::meshes_without_an_area_are_flattened",
         "tests/tests/two_level.rs::kernels_are_their_twins",
         "tests/tests/two_level.rs::rays_that_a_quota_stops_go_on",
         "tests/tests/instances.rs::instances_without_rounding_have_the_pictures_of_flattened_ones",
         "tests/tests/instances.rs::normals_and_colours_of_instances_are_those_of_flattened_ones",
         "tests/tests/instances.rs::moved_instances_and_refitted_meshes_are_as_if_made_so",
+        "tests/tests/instances.rs::moves_are_held_against_the_box_by_their_triangles",
         "tests/tests/instances.rs::memory_grows_with_meshes_and_little_with_instances",
         "tests/tests/instances.rs::five_hundred_million_triangles_are_rendered_within_the_baseline",
         "tests/tests/seams.rs::no_ray_is_lost_at_seams_in_any_index",

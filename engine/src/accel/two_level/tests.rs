@@ -283,6 +283,30 @@ fn names_stand_for_places_in_a_mesh() {
 }
 
 #[test]
+fn names_that_no_hit_could_have_are_refused() {
+    let triangles = grid(1);
+    let build = |names: &[u32]| {
+        let mesh = MeshGeometry {
+            triangles: &triangles,
+            names: Some(names),
+        };
+        TwoLevelBvh::build(&[mesh], &[Placement::identity(0)], &WideSettings::default())
+    };
+    assert_eq!(triangles.len(), 2);
+    assert!(build(&[7, NO_HIT - 1]).is_ok());
+    for (names, at) in [
+        (&[7][..], "meshes[0].names"),
+        (&[7, 8, 9][..], "meshes[0].names"),
+        (&[7, NO_HIT][..], "meshes[0].names[1]"),
+    ] {
+        match build(names) {
+            Err(Error::Setting { name, .. }) => assert_eq!(name, at),
+            other => panic!("{names:?}: {other:?}"),
+        }
+    }
+}
+
+#[test]
 fn moving_makes_the_tree_above_and_nothing_else() {
     let mut random = Random(38);
     let (_, mut world) = worlds(&mut random)

@@ -1,4 +1,5 @@
-//! Twin of the kernels' traversal of two levels: same order, same f32 operations, exact counters.
+//! Twin of the kernels' traversal of two levels: same order, same f32 operations, and, without a filter of candidates, the same counters. With one the
+//! kernels count a round and a search among instances more for each candidate that they ask about.
 //!
 //! Nodes are visited as in a wide tree ([`wide::traverse`](crate::accel::wide::traverse)), whose order goes on through instances: one stands in the place of a child
 //! node, and when its turn comes the ray is taken to the space of its mesh, by the octant that it has there. What is left of the tree above waits on
@@ -106,8 +107,9 @@ impl TwoLevelTraversal {
 
     /// Runs for about `quota` iterations, at least 1; [`Self::resume`] says whether it is done.
     ///
-    /// It stops in front of nodes only, so a node, its triangles and a round may come on top of the quota. The walk back takes an iteration a level: a
-    /// quota above twice [`MAX_DEPTH`] makes progress.
+    /// It stops in front of nodes only, so a node, its triangles and a round may come on top of the quota. The walk back takes an iteration a level, and
+    /// a round where it goes into an instance: a quota of twice [`MAX_DEPTH`] and three rounds of `WIDE_ROUND_ITERATIONS`, which is the least that kernels
+    /// are given, makes progress.
     pub fn run(
         &mut self,
         bvh: &TwoLevelBvh,
@@ -227,7 +229,7 @@ impl TwoLevelTraversal {
         }
         counters.iterations += iterations;
         self.resume = match inside {
-            Some(inside) if next != FINISHED => bvh.records()[inside.instance].walk + (next - inside.root),
+            Some(inside) if next != FINISHED => bvh.records()[inside.instance].first_node + (next - inside.root),
             _ => next,
         };
     }
@@ -307,9 +309,9 @@ fn way_to(bvh: &TwoLevelBvh, resume: u32) -> Vec<u32> {
     let records: &[InstanceRecord] = bvh.records();
     let mut node = resume;
     if resume >= bvh.header().top {
-        let record = &records[records.partition_point(|record| record.walk <= resume) - 1];
+        let record = &records[records.partition_point(|record| record.first_node <= resume) - 1];
         let inner: InstanceNode = bytemuck::cast(nodes[record.place as usize]);
-        climb(inner.root + (resume - record.walk), inner.root);
+        climb(inner.root + (resume - record.first_node), inner.root);
         node = record.place;
     }
     climb(node, 0);

@@ -139,7 +139,8 @@ impl WideBuilder {
     }
 
     /// Records a build over the triangles of `binary`, as [`LbvhBuilder::record_traversable`] has them, and its collapse: the passes of the former, then
-    /// `wide: costs` and `wide: nodes`. It ends with a barrier: compute shaders and copies may read the texels after it, in the same submission.
+    /// `wide: costs` and `wide: nodes`. Earlier uses of the buffers by compute shaders and copies are waited for; triangles must have been made visible as there.
+    /// It ends with a barrier: compute shaders and copies may read the texels after it, in the same submission.
     ///
     /// # Errors
     /// As [`LbvhBuilder::record_traversable`]; [`Error::LimitExceeded`] for buffers of fewer triangles.
@@ -167,7 +168,9 @@ impl WideBuilder {
             });
         }
         recorder.pass("wide: costs", |pass| {
-            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE.union(Access::TRANSFER_WRITE));
+            // Copies, too, may read the texels of the last build.
+            let before = Access::COMPUTE.union(Access::TRANSFER);
+            pass.memory_barrier(before, Access::COMPUTE.union(Access::TRANSFER_WRITE));
             pass.fill(buffers.arrival_counters.view(), 0)?;
             let state = WideState {
                 listed: 1,

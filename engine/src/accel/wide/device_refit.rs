@@ -29,7 +29,7 @@ pub struct RefittableWide {
     /// What rays traverse, as [`RayIndex::texels`] has it.
     pub texels: TexelView,
     /// Corners of the triangles by their indices, three vectors each, metres, also of those that the tree has left out, which are not read. To be filled
-    /// before a refit; triangles without an area have to be points.
+    /// before a refit with numbers that are finite and within [`MAX_COORDINATE`](crate::accel::MAX_COORDINATE); triangles without an area have to be points.
     pub corners: Buffer,
     triangles: u32,
     levels: Buffer,
@@ -111,7 +111,7 @@ impl WideRefitter {
     }
 
     /// Records a refit to the triangles that are in [`RefittableWide::corners`], which must be visible to compute shaders: passes
-    /// `wide: refit triangles` and `wide: refit boxes`. The tree stays what it was, so it is best where little has moved. It ends with a barrier: compute
+    /// `wide: refit triangles` and `wide: refit boxes`. Earlier uses of the texels by compute shaders and copies are waited for. The tree stays what it was, so it is best where little has moved. It ends with a barrier: compute
     /// shaders and copies may read the texels after it.
     ///
     /// # Errors
@@ -122,7 +122,8 @@ impl WideRefitter {
         }
         let words = index.texels.buffer().view();
         recorder.pass("wide: refit triangles", |pass| {
-            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            // Copies, too, may read the texels of the last refit.
+            pass.memory_barrier(Access::COMPUTE.union(Access::TRANSFER), Access::COMPUTE);
             let set = wide_refit_triangles::Set0 {
                 wide_texels: words,
                 wide_corners: index.corners.view(),

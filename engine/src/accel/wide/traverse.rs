@@ -1,4 +1,5 @@
-//! Twin of the kernels' traversal of the wide hierarchy: same order, same f32 operations, exact counters.
+//! Twin of the kernels' traversal of the wide hierarchy: same order, same f32 operations, and, without a filter of candidates, the same counters. With
+//! one the kernels count a round more for each candidate that they ask about.
 //!
 //! A node's slots are visited in the order of slot ^ octant, where a bit of the ray's octant is set if the ray goes down along that axis: the order of
 //! all nodes is thus fixed for a ray, and a place in it is named by a node. All triangles of a node that are in boxes which the ray meets are tested

@@ -2,6 +2,7 @@
 
 use super::observer;
 use crate::scene::ConductorIor;
+use glam::Vec3;
 
 /// Most samples of a text.
 const SAMPLES_MAX: usize = 65_536;
@@ -23,8 +24,8 @@ impl IndexSpectrum {
     /// Reads lines of a wavelength in nanometres, n and k, apart by spaces, tabs, commas or semicolons; what follows a `#` is left out.
     ///
     /// # Errors
-    /// With its line: a line that has not three numbers, wavelengths that do not rise, n that is not above 0, k below 0; fewer than two samples, more than
-    /// 65,536, or samples that do not cover 400 to 700 nm.
+    /// With its line: a line that has not three numbers, wavelengths that do not rise, n below a millionth, k below 0, any of them above a million; fewer than two samples,
+    /// more than 65,536, or samples that do not cover 400 to 700 nm.
     pub fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut samples: Vec<[f64; 3]> = Vec::new();
         for (line, text) in (1..).zip(text.lines()) {
@@ -39,10 +40,11 @@ impl IndexSpectrum {
             let Some([wavelength, n, k]) = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok()) else {
                 return fault("needs three numbers: a wavelength in nanometres, n and k");
             };
-            // The greatest numbers whose squares, of which there are products, f32 can hold.
             let sound = |x: f64, least: f64| (least..=1e6).contains(&x);
-            if !(sound(wavelength, 0.0) && sound(n, f64::from(f32::MIN_POSITIVE)) && sound(k, 0.0)) {
-                return fault("n must be above 0, k and the wavelength at least 0, all of them at most a million");
+            if !(sound(wavelength, 0.0) && sound(n, 1e-6) && sound(k, 0.0)) {
+                return fault(
+                    "n must be at least a millionth, k and the wavelength at least 0, all of them at most a million",
+                );
             }
             if samples.last().is_some_and(|last| last[0] >= wavelength) {
                 return fault("wavelengths must rise from line to line");
@@ -69,6 +71,12 @@ impl IndexSpectrum {
         Ok(Self { samples })
     }
 
+    /// The first and the last wavelength of the samples, in nanometres.
+    pub fn range(&self) -> [f64; 2] {
+        let ends = [self.samples.first(), self.samples.last()];
+        ends.map(|sample| sample.map_or(0.0, |sample| sample[0]))
+    }
+
     /// n and k at a wavelength in nanometres, by linear interpolation; outside of the samples those of the nearest one.
     pub fn at(&self, wavelength: f64) -> [f64; 2] {
         let above = self.samples.partition_point(|sample| sample[0] < wavelength);
@@ -87,12 +95,14 @@ impl IndexSpectrum {
     }
 
     /// The means of n and k over the red, green and blue channels' sensitivities, as for the engine's own metals. The sensitivities have negative
-    /// parts, so that sharp spectra can give means that no material has: n is at least the smallest positive number of f32, k at least 0.
+    /// parts, so that sharp spectra can give means that no material has, which are cut off at the ends of what a scene may hold
+    /// ([`ConductorIor::is_in_range`]).
     pub fn channels(&self) -> ConductorIor {
         let mean = |quantity: usize| observer::project(|wavelength| self.at(wavelength)[quantity]).as_vec3();
+        let [least, greatest] = ConductorIor::ETA.map(Vec3::splat);
         ConductorIor {
-            eta: mean(0).max(glam::Vec3::splat(f32::MIN_POSITIVE)),
-            k: mean(1).max(glam::Vec3::ZERO),
+            eta: mean(0).clamp(least, greatest),
+            k: mean(1).clamp(Vec3::ZERO, Vec3::splat(ConductorIor::K_MAX)),
         }
     }
 
@@ -121,6 +131,22 @@ mod tests {
             .expect("spectrum")
             .channels();
         assert!((constant.eta - 0.5).abs().max_element() < 1e-6 && (constant.k - 2.0).abs().max_element() < 1e-6);
+        assert_eq!(read.range(), [380.0, 800.0]);
+        // A line where the sensitivity to red is most negative.
+        let sharp = (380..=780).map(|w| {
+            format!(
+                "{w} {} {}\n",
+                if w == 510 { 1e6 } else { 1e-6 },
+                if w == 510 { 1e6 } else { 0.0 }
+            )
+        });
+        let sharp = IndexSpectrum::parse(&sharp.collect::<String>())
+            .expect("spectrum")
+            .channels();
+        assert!(
+            sharp.is_in_range() && sharp.eta.x == ConductorIor::ETA[0] && sharp.k.x == 0.0,
+            "{sharp:?}"
+        );
         for (text, words) in [
             ("", "no samples"),
             ("# nothing", "no samples"),
@@ -128,10 +154,11 @@ mod tests {
             ("400 1 2 3\n", "line 1: needs three numbers"),
             ("400 1 x\n", "line 1: needs three numbers"),
             ("400 1 2\n\n400 1 2\n", "line 3: wavelengths must rise"),
-            ("400 0 2\n", "line 1: n must be above 0"),
-            ("400 1 -2\n", "line 1: n must be above 0"),
-            ("400 nan 2\n", "line 1: n must be above 0"),
-            ("400 1 inf\n", "line 1: n must be above 0"),
+            ("400 1e-7 2\n", "line 1: n must be at least a millionth"),
+            ("400 0 2\n", "line 1: n must be at least a millionth"),
+            ("400 1 -2\n", "line 1: n must be at least a millionth"),
+            ("400 nan 2\n", "line 1: n must be at least a millionth"),
+            ("400 1 inf\n", "line 1: n must be at least a millionth"),
             ("450 1 2\n800 1 2\n", "do not cover"),
             ("0.38 1 2\n0.8 1 2\n", "micrometres"),
         ] {

@@ -325,10 +325,17 @@ impl Sidecar {
                 table.microfacets(),
             ),
         };
+        if microfacets.is_some() {
+            let places = named.get(name).into_iter().flatten();
+            let mut materials = places.map(|&place| &scene.materials[place]);
+            let is_metal = |m: &Material| m.metallic_roughness_texture.is_none() && m.transmission == 0.0;
+            let cause = "names microfacets, which need a material without transmission and without a texture of metal and roughness";
+            self.require(materials.all(is_metal), &key, cause)?;
+        }
         self.change_materials(scene, named, [&key, name], |material| {
             material.conductor = Some(conductor);
             material.fresnel = fresnel;
-            material.microfacets = microfacets;
+            material.classic_microfacets = microfacets;
             material.metallic = 1.0;
         })
     }
@@ -353,13 +360,13 @@ impl Sidecar {
             (1, Some(metal), ..) => self.named_metal(key, metal),
             (1, _, Some(file), ..) => self.spectrum(&format!("{key}.spectrum"), file, read),
             (2, _, _, Some((eta, k)), _) => {
-                let sound =
-                    eta.iter().all(|e| e.is_finite() && *e > 0.0) && k.iter().all(|k| k.is_finite() && *k >= 0.0);
-                self.require(sound, key, "needs eta above 0 and k at least 0")?;
-                Ok(ConductorIor {
+                let index = ConductorIor {
                     eta: Vec3::from_array(eta),
                     k: Vec3::from_array(k),
-                })
+                };
+                let cause = "needs eta from a millionth to a million and k from 0 to a million";
+                self.require(index.is_in_range(), key, cause)?;
+                Ok(index)
             }
             (2, .., Some((reflectance, edge_tint))) => {
                 let sound = reflectance.iter().chain(&edge_tint).all(|x| (0.0..=1.0).contains(x));

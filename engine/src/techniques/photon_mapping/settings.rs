@@ -121,7 +121,9 @@ crate::settings! {
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.
         pub map_build: MapBuild = MapBuild::Auto;
-        /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
+        /// Owen-scrambled Sobol' points, such that are jointly even in their first sixteen dimensions, or independent samples (PCG); changes the noise only.
+        ///
+        /// Photons are samples, too, and the joint points are even in runs of 65,536 of them.
         pub sampler: SamplerKind = SamplerKind::Sobol;
     }
     unlisted {

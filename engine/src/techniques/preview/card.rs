@@ -16,7 +16,7 @@ use crate::transport::PathSet;
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Biased(
     "shadow maps err at borders of shadows, and as a whole where things are no larger than texels; directional lights have none; an \
-     environment's light is not occluded, and its reflections are filtered by round lobes",
+     environment's light is not occluded, and its reflections are filtered by round lobes, with Schlick's factor off rough metals",
 );
 
 /// Clip distances cut the octants of shadow maps, as the default layout has them.
@@ -35,8 +35,9 @@ const KERNELS: [&ShaderInfo; 7] = [
 
 /// Why there is nothing of a scene with media.
 pub(super) const NO_MEDIA: &str = "participating media are not shown";
-/// Why there is nothing of a scene with modified Phong surfaces.
+/// Why there is nothing of a scene with classical microfacets.
 pub(super) const NO_CLASSIC: &str = "its probes are filtered by the GGX lobe, not by classical microfacets";
+/// Why there is nothing of a scene with modified Phong surfaces.
 pub(super) const NO_PHONG: &str = "its probes are not filtered by modified Phong lobes";
 
 /// The catalogue's entry.
@@ -99,7 +100,7 @@ const ROWS: &[Row] = &[Row {
     id: "CL-PREVIEW",
     name: "technique `preview`: deferred shading with shadow maps and light probes, frame by frame, and the same for hosts' own frames",
     role: Role::Technique,
-    limits: "Light of surfaces on others is left out, except for what a host's probe holds; directional lights cast no shadows, nothing is seen through glass, and modified Phong surfaces are refused.",
+    limits: "Light of surfaces on others is left out, except for what a host's probe holds; directional lights cast no shadows, nothing is seen through glass, and classical microfacets and modified Phong surfaces are refused.",
     sources: &[
         sources::DEERING_1988.whole(),
         sources::SAITO_TAKAHASHI_1990.whole(),

@@ -5,8 +5,8 @@
 //! [`LightProbe`]. One compute pass shades what is seen: surfaces and their scattering functions are the path tracer's own.
 //!
 //! What it shows: emission; point, spot and directional lights, through shadow maps where they have a place; light of a [`LightProbe`] by two
-//! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact
-//! albedo. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them;
+//! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact albedo,
+//! but for rough metals by another factor than Schlick's. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them;
 //! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table.
 //!
 //! Bias, all of it:
@@ -15,6 +15,8 @@
 //! - Directional lights cast no shadows; shadows of the others have the bias of [`OmniShadowMaps`](crate::raster::OmniShadowMaps).
 //! - A probe's light is neither occluded nor nearer than infinity, and interreflection is limited to what a probe holds.
 //! - Microfacet reflections are filtered by a round lobe, mixed of two for roughnesses between those of a probe's levels ([`probe`]), without what the lobe's own Fresnel factors and masking do to its shape.
+//! - Rough metals reflect a probe's light by Schlick's factor from their reflectance at normal incidence, whatever the form that they name: without the dip of
+//!   Fresnel's equations near grazing angles, which is up to 18 % of aluminium's red. Smooth metals have their form.
 //! - Nothing is seen through materials that transmit, and glass casts full shadows.
 //! - Partial alpha is drawn opaque, in the picture, in shadow maps and in live maps.
 //!
@@ -23,8 +25,8 @@
 //! There are two ways to use it: [`Preview`], for hosts that move lights and surfaces, light parts by probes of their own and show one frame each time; and [`PreviewMethod`],
 //! a [`FrameMethod`](super::FrameMethod), which is the technique `preview`. That one sees each frame through another place of its pixels, and of the lens,
 //! so that edges and what is out of focus converge as frames add up; the environment is its probe. It refuses scenes whose light it would leave out:
-//! those where surfaces emit light, those with media, and those where light passes through surfaces; and those with modified Phong surfaces, which both
-//! ways refuse where there are probes, since these are filtered by GGX lobes.
+//! those where surfaces emit light, those with media, and those where light passes through surfaces; and those with classical microfacets or modified Phong
+//! surfaces, which both ways refuse where there are probes, since these are filtered by GGX lobes.
 
 mod card;
 mod drawing;

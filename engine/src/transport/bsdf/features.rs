@@ -12,7 +12,7 @@ pub struct BsdfFeatures {
     /// Some `metallic` > 0.
     pub metal: bool,
     /// Some metal is an exact conductor.
-    pub conductor: bool,
+    pub exact_conductor: bool,
     /// Some conductor has Schlick's curve, its own or rescaled.
     pub schlick_conductor: bool,
     /// Some conductor has a compensated curve.
@@ -39,7 +39,7 @@ impl BsdfFeatures {
     /// Everything, height-correlated.
     pub const ALL: Self = Self {
         metal: true,
-        conductor: true,
+        exact_conductor: true,
         schlick_conductor: true,
         compensated_conductor: true,
         tinted_conductor: true,
@@ -54,7 +54,7 @@ impl BsdfFeatures {
     /// Lambert only.
     pub const NONE: Self = Self {
         metal: false,
-        conductor: false,
+        exact_conductor: false,
         schlick_conductor: false,
         compensated_conductor: false,
         tinted_conductor: false,
@@ -74,19 +74,20 @@ impl BsdfFeatures {
             .filter(|m| !m.unlit)
             .fold(Self::NONE, |f, m| Self {
                 metal: f.metal || m.metallic > 0.0,
-                conductor: f.conductor || m.has_conductor(&[FresnelForm::Exact]),
+                exact_conductor: f.exact_conductor || m.has_conductor(&[FresnelForm::Exact]),
                 schlick_conductor: f.schlick_conductor
                     || m.has_conductor(&[FresnelForm::Schlick, FresnelForm::Rescaled]),
                 compensated_conductor: f.compensated_conductor || m.has_conductor(&[FresnelForm::Compensated]),
                 tinted_conductor: f.tinted_conductor || m.has_conductor(&[FresnelForm::F82Tint, FresnelForm::Hoffman]),
                 simplified_conductor: f.simplified_conductor || m.has_conductor(&[FresnelForm::Simplified]),
-                classic_microfacets: f.classic_microfacets || m.microfacets.is_some(),
+                classic_microfacets: f.classic_microfacets || m.classic_microfacets.is_some(),
                 phong: f.phong || (m.metallic > 0.0 && m.phong),
                 specular_layer: f.specular_layer
                     || (m.specular > 0.0 && m.metallic < 1.0)
                     || (m.specular > 0.0 && m.metallic_roughness_texture.is_some()),
                 transmission: f.transmission || m.transmission > 0.0,
-                multiple_scattering: f.multiple_scattering || (m.metallic > 0.0 && !m.phong && m.microfacets.is_none()),
+                multiple_scattering: f.multiple_scattering
+                    || (m.metallic > 0.0 && !m.phong && m.classic_microfacets.is_none()),
                 separable_masking: false,
             })
     }

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::{
-    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_IMPORTANCE,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_IMPORTANCE,
     BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf,
     BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed,
     mean3,
@@ -99,9 +99,9 @@ impl BsdfContext<'_> {
         if self.is_phong(b) {
             return b.base_color;
         }
-        let [eta, k, exponent] = [b.conductor_eta, b.conductor_k, b.conductor_average];
+        let [eta, k, exponent] = [b.conductor_a, b.conductor_b, b.conductor_c];
         match b.flags & self.conductor_flags() {
-            BSDF_CONDUCTOR => fresnel_conductor(cos_h, eta, k),
+            BSDF_EXACT_CONDUCTOR => fresnel_conductor(cos_h, eta, k),
             BSDF_SCHLICK_CONDUCTOR => fresnel_schlick(cos_h, eta),
             BSDF_COMPENSATED_CONDUCTOR => fresnel_compensated(cos_h, eta, k, exponent),
             BSDF_TINTED_CONDUCTOR => fresnel_tinted(cos_h, eta, k),
@@ -114,7 +114,7 @@ impl BsdfContext<'_> {
     fn conductor_flags(&self) -> u32 {
         let f = &self.features;
         [
-            (f.conductor, BSDF_CONDUCTOR),
+            (f.exact_conductor, BSDF_EXACT_CONDUCTOR),
             (f.schlick_conductor, BSDF_SCHLICK_CONDUCTOR),
             (f.compensated_conductor, BSDF_COMPENSATED_CONDUCTOR),
             (f.tinted_conductor, BSDF_TINTED_CONDUCTOR),
@@ -129,12 +129,10 @@ impl BsdfContext<'_> {
     fn conductor_average(&self, b: &Bsdf) -> Option<DVec3> {
         match b.flags & self.conductor_flags() {
             0 => None,
-            BSDF_COMPENSATED_CONDUCTOR => Some(fresnel_compensated_average(
-                b.conductor_eta,
-                b.conductor_k,
-                b.conductor_average,
-            )),
-            _ => Some(b.conductor_average),
+            BSDF_COMPENSATED_CONDUCTOR => {
+                Some(fresnel_compensated_average(b.conductor_a, b.conductor_b, b.conductor_c))
+            }
+            _ => Some(b.conductor_c),
         }
     }
 

@@ -51,15 +51,15 @@ pub const LOBE_ALL: u32 = constants::LOBE_ALL;
 
 /// Transmission goes straight through a thin wall.
 pub const BSDF_THIN: u32 = constants::BSDF_THIN;
-/// The metal is `conductor_eta` + i `conductor_k`, not `base_color`.
-pub const BSDF_CONDUCTOR: u32 = constants::BSDF_CONDUCTOR;
-/// The metal is a conductor of normal reflectance `conductor_eta` by Schlick's curve.
+/// The metal is `conductor_a` + i `conductor_b`, not `base_color`.
+pub const BSDF_EXACT_CONDUCTOR: u32 = constants::BSDF_EXACT_CONDUCTOR;
+/// The metal is a conductor of normal reflectance `conductor_a` by Schlick's curve.
 pub const BSDF_SCHLICK_CONDUCTOR: u32 = constants::BSDF_SCHLICK_CONDUCTOR;
-/// The same less a term of coefficient `conductor_k` and exponent `conductor_average`.
+/// The same less a term of coefficient `conductor_b` and exponent `conductor_c`.
 pub const BSDF_COMPENSATED_CONDUCTOR: u32 = constants::BSDF_COMPENSATED_CONDUCTOR;
-/// The same less a term of coefficient `conductor_k` and exponent 6.
+/// The same less a term of coefficient `conductor_b` and exponent 6.
 pub const BSDF_TINTED_CONDUCTOR: u32 = constants::BSDF_TINTED_CONDUCTOR;
-/// The metal is `conductor_eta` + i `conductor_k` by the simplified factor.
+/// The metal is `conductor_a` + i `conductor_b` by the simplified factor.
 pub const BSDF_SIMPLIFIED_CONDUCTOR: u32 = constants::BSDF_SIMPLIFIED_CONDUCTOR;
 /// The metal's microfacets are not GGX's under Smith's masking; with the next three bits it says which they are.
 pub const BSDF_CLASSIC: u32 = constants::BSDF_CLASSIC;

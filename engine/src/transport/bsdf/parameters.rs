@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_PHONG,
+    BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_PHONG,
     BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_THIN, BSDF_TINTED_CONDUCTOR,
     ETA_MATCHED,
 };
@@ -24,15 +24,15 @@ pub struct Bsdf {
     /// Strength of the layer.
     pub specular: f64,
     /// Real part of the conductor's index, or its normal reflectance: the first of [`MetalFresnel::parameters`].
-    pub conductor_eta: DVec3,
+    pub conductor_a: DVec3,
     /// GGX width, which stands for the exponent of a Phong lobe too; a mirror below [`ALPHA_MIN`].
     pub alpha: f64,
     /// Imaginary part of the conductor's index, or a coefficient: the second of them.
-    pub conductor_k: DVec3,
+    pub conductor_b: DVec3,
     /// Share of transmission below the layer.
     pub transmission: f64,
     /// Cosine-weighted average of the conductor's factor, or an exponent: the third of them.
-    pub conductor_average: DVec3,
+    pub conductor_c: DVec3,
     /// Index inside ÷ outside; 0 stands for Schlick's factor.
     pub eta: f64,
     /// `BSDF_…` bits.
@@ -42,7 +42,7 @@ pub struct Bsdf {
 /// The bit of [`Bsdf::flags`] that says which form of Fresnel factor a conductor has.
 pub(crate) fn conductor_flag(fresnel: &MetalFresnel) -> u32 {
     match fresnel {
-        MetalFresnel::Exact { .. } => BSDF_CONDUCTOR,
+        MetalFresnel::Exact { .. } => BSDF_EXACT_CONDUCTOR,
         MetalFresnel::Schlick { .. } => BSDF_SCHLICK_CONDUCTOR,
         MetalFresnel::Compensated { .. } => BSDF_COMPENSATED_CONDUCTOR,
         MetalFresnel::Tinted { .. } => BSDF_TINTED_CONDUCTOR,
@@ -102,11 +102,11 @@ pub fn bsdf_gltf(g: &GltfFactors) -> Bsdf {
         metallic: g.metallic.clamp(0.0, 1.0),
         specular_f0,
         specular: g.specular.clamp(0.0, 1.0),
-        conductor_eta: DVec3::ONE,
+        conductor_a: DVec3::ONE,
         alpha,
-        conductor_k: DVec3::ZERO,
+        conductor_b: DVec3::ZERO,
         transmission,
-        conductor_average: DVec3::ZERO,
+        conductor_c: DVec3::ZERO,
         eta,
         flags: if solid { 0 } else { BSDF_THIN },
     }
@@ -127,7 +127,7 @@ impl Bsdf {
         });
         let base = m.conductor.map_or(base, |c| base.with_conductor_form(&c, m.fresnel));
         let base = m
-            .microfacets
+            .classic_microfacets
             .map_or(base, |microfacets| base.with_microfacets(microfacets));
         if m.phong { base.with_phong() } else { base }
     }
@@ -156,11 +156,11 @@ impl Bsdf {
     /// The same with a conductor as its metal, whose Fresnel factor has this form.
     pub fn with_conductor_form(self, ior: &ConductorIor, form: FresnelForm) -> Self {
         let fresnel = MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3());
-        let [conductor_eta, conductor_k, conductor_average] = fresnel.parameters();
+        let [conductor_a, conductor_b, conductor_c] = fresnel.parameters();
         Self {
-            conductor_eta,
-            conductor_k,
-            conductor_average,
+            conductor_a,
+            conductor_b,
+            conductor_c,
             flags: self.flags | conductor_flag(&fresnel),
             ..self
         }

@@ -207,7 +207,7 @@ fn classical_metals_are_the_product_of_their_parts() {
         for alpha in [0.1f64, 0.4, 1.0] {
             let material = Material {
                 roughness: alpha.sqrt() as f32,
-                microfacets: Some(microfacets),
+                classic_microfacets: Some(microfacets),
                 ..Material::mirror("white", Vec3::ONE)
             };
             let b = Bsdf::from_material(&material);
@@ -258,14 +258,14 @@ fn metals_reflect_by_the_form_they_name() {
         };
         let features = BsdfFeatures::of_materials([&material]);
         let compiled = [
-            features.conductor,
+            features.exact_conductor,
             features.schlick_conductor,
             features.compensated_conductor,
             features.tinted_conductor,
             features.simplified_conductor,
         ];
         assert_eq!(compiled.iter().filter(|on| **on).count(), 1, "{form}: {compiled:?}");
-        assert_eq!(features.conductor, form == FresnelForm::Exact);
+        assert_eq!(features.exact_conductor, form == FresnelForm::Exact);
         let b = Bsdf::from_material(&material);
         let fresnel = MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3());
         for c in [context(features), context(BsdfFeatures::ALL)] {

@@ -255,6 +255,31 @@ mod tests {
     }
 
     #[test]
+    fn forms_are_numbers_at_the_ends_of_the_range_of_indices() {
+        let [least, greatest] = crate::scene::ConductorIor::ETA.map(f64::from);
+        for (n, k) in [
+            (least, 0.0),
+            (least, 1e6),
+            (1.0, 0.0),
+            (1.0, 1e6),
+            (greatest, 0.0),
+            (greatest, 1e6),
+        ] {
+            for name in FresnelForm::ALL {
+                let form = MetalFresnel::new(name, DVec3::splat(n), DVec3::splat(k));
+                assert!(form.parameters().iter().all(|x| x.as_vec3().is_finite()), "{form:?}");
+                for i in 0..=100 {
+                    let f = form.at(f64::from(i) / 100.0);
+                    assert!(
+                        f.is_finite() && f.min_element() >= 0.0 && f.max_element() <= 1.0,
+                        "{form:?}: {f}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
     fn constants_are_those_of_the_spectra() {
         for metal in METALS {
             let [n, k] = metals::spectrum(metal.name).expect("spectrum").at(metal.wavelength);

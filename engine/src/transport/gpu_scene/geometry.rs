@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DMat3, Vec3, Vec4};
+use glam::{DAffine3, DMat3, Vec3};
 
 use super::kept::{Keeping, KeptInstances};
 use crate::accel::MAX_COORDINATE;
@@ -31,13 +31,8 @@ pub(super) struct Geometry {
     placed_vertices: u32,
 }
 
-/// A mesh where it is to be, and what becomes of its normals and tangents there.
-struct WorldMesh<'a> {
-    positions: Vec<Vec3>,
-    normal: &'a dyn Fn(Vec3) -> Vec3,
-    tangent: &'a dyn Fn(Vec4) -> Vec4,
-    flipped: bool,
-}
+/// Texels of a triangle's record.
+pub(super) const TRIANGLE_TEXELS: u64 = (size_of::<SceneTriangle>() / size_of::<[u32; 4]>()) as u64;
 
 /// Instances in the order of their triangles.
 pub(super) fn instances_in_order(scene: &Scene) -> impl Iterator<Item = &Instance> {
@@ -76,7 +71,6 @@ pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
 /// Fails for more triangles or vertices than fit in texel buffers of `limit` texels, before any is placed: a small file may place one mesh a million
 /// times. Of the instances that `keeping` keeps each mesh counts once.
 pub(super) fn check_placed(scene: &Scene, profile: &SceneProfile, keeping: Option<&Keeping>, limit: u64) -> Result<()> {
-    const TRIANGLE_TEXELS: u64 = (size_of::<SceneTriangle>() / size_of::<[u32; 4]>()) as u64;
     let placed = |of: fn(&Mesh) -> usize| {
         let flattened = (0..scene.instances.len()).filter(|i| keeping.is_none_or(|keeping| !keeping.instances[*i]));
         let placed = flattened.map(|i| of(&scene.meshes[scene.instances[i].mesh as usize]) as u64);
@@ -121,7 +115,16 @@ impl Geometry {
     /// Adds the triangles of an instance, in world space.
     pub(super) fn place(&mut self, scene: &Scene, instance: &Instance, profile: &SceneProfile) -> Result<()> {
         let mesh = &scene.meshes[instance.mesh as usize];
-        let linear = instance.transform.matrix3;
+        self.add(scene, mesh, &instance.transform, profile)
+    }
+
+    /// Adds the triangles of a mesh as they are, in its own space: as an instance that is where it is has them, with normals of unit length.
+    pub(super) fn store(&mut self, scene: &Scene, mesh: &Mesh, profile: &SceneProfile) -> Result<()> {
+        self.add(scene, mesh, &DAffine3::IDENTITY, profile)
+    }
+
+    fn add(&mut self, scene: &Scene, mesh: &Mesh, transform: &DAffine3, profile: &SceneProfile) -> Result<()> {
+        let linear = transform.matrix3;
         // Cofactors transform normals without dividing by a determinant that may be zero.
         let cofactors = DMat3::from_cols(
             linear.y_axis.cross(linear.z_axis),
@@ -130,34 +133,6 @@ impl Geometry {
         );
         let flipped = linear.determinant() < 0.0;
         let orientation = if flipped { -1.0 } else { 1.0 };
-        let world = WorldMesh {
-            positions: mesh
-                .positions
-                .iter()
-                .map(|p| instance.transform.transform_point3(p.as_dvec3()).as_vec3())
-                .collect(),
-            normal: &|n: Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3(),
-            tangent: &|t: Vec4| {
-                let world = (linear * t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
-                world.extend(t.w * orientation as f32)
-            },
-            flipped,
-        };
-        self.add(scene, mesh, world, profile)
-    }
-
-    /// Adds the triangles of a mesh as they are, in its own space.
-    pub(super) fn store(&mut self, scene: &Scene, mesh: &Mesh, profile: &SceneProfile) -> Result<()> {
-        let own = WorldMesh {
-            positions: mesh.positions.clone(),
-            normal: &|n| n,
-            tangent: &|t| t,
-            flipped: false,
-        };
-        self.add(scene, mesh, own, profile)
-    }
-
-    fn add(&mut self, scene: &Scene, mesh: &Mesh, world: WorldMesh<'_>, profile: &SceneProfile) -> Result<()> {
         let base = self.placed_vertices;
         self.placed_vertices = u32::try_from(mesh.positions.len())
             .ok()
@@ -165,8 +140,9 @@ impl Geometry {
             .ok_or_else(|| Error::scene(&scene.source, "instances", "place more than 2^32 vertices"))?;
         let end = self.placed_vertices as usize;
         if profile.has_shading_normals {
-            let normals = mesh.normals.iter().map(|n| (world.normal)(*n).extend(0.0).to_array());
-            self.normals.extend(normals);
+            let normal = |n: &Vec3| (cofactors * n.as_dvec3() * orientation).normalize_or_zero().as_vec3();
+            self.normals
+                .extend(mesh.normals.iter().map(|n| normal(n).extend(0.0).to_array()));
             // Zero stands for "flat" in the shader.
             self.normals.resize(end, [0.0; 4]);
         }
@@ -178,8 +154,11 @@ impl Geometry {
             }));
         }
         if profile.has_normal_maps {
-            self.tangents
-                .extend(mesh.tangents.iter().map(|t| (world.tangent)(*t).to_array()));
+            let tangents = mesh.tangents.iter().map(|t| {
+                let world = (linear * t.truncate().as_dvec3()).normalize_or_zero().as_vec3();
+                world.extend(t.w * orientation as f32).to_array()
+            });
+            self.tangents.extend(tangents);
             self.tangents.resize(end, [0.0; 4]);
         }
         if profile.has_vertex_colors {
@@ -188,9 +167,10 @@ impl Geometry {
         }
         let material = mesh.material.unwrap_or(scene.materials.len() as u32);
         let has_attributes = has_attributes(profile);
-        let positions = &world.positions;
+        let place = |p: &Vec3| transform.transform_point3(p.as_dvec3()).as_vec3();
+        let positions: Vec<Vec3> = mesh.positions.iter().map(place).collect();
         for &[a, b, c] in &mesh.triangles {
-            let (b, c) = if world.flipped { (c, b) } else { (b, c) };
+            let (b, c) = if flipped { (c, b) } else { (b, c) };
             self.triangles.push(SceneTriangle {
                 a: positions[a as usize].to_array(),
                 material,
@@ -290,9 +270,30 @@ pub(super) fn corners_of(triangle: &SceneTriangle) -> [Vec3; 3] {
 
 #[cfg(test)]
 mod tests {
-    use glam::DAffine3;
-
     use super::*;
+
+    #[test]
+    fn stored_meshes_are_as_instances_without_a_transform_have_them() {
+        let mut scene = Scene::default();
+        let mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(0.3, 0.7, 0.1)],
+            normals: vec![Vec3::new(0.2, 0.3, 4.0), Vec3::ZERO, Vec3::new(-1e-3, 2e-3, 1e-3)],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        };
+        scene.place(mesh.clone());
+        let profile = SceneProfile::of(&scene);
+        assert!(profile.has_shading_normals);
+        let flat = Geometry::flatten(&scene, &profile).expect("small");
+        let mut stored = Geometry::default();
+        stored.store(&scene, &mesh, &profile).expect("small");
+        assert_eq!(stored.triangles, flat.triangles);
+        assert_eq!(stored.normals, flat.normals);
+        for (i, length) in [1.0, 0.0, 1.0].into_iter().enumerate() {
+            let [x, y, z, _] = stored.normals[i];
+            assert!((Vec3::new(x, y, z).length() - length).abs() < 1e-6, "{i}");
+        }
+    }
 
     #[test]
     fn what_instances_place_is_held_against_the_limit() {

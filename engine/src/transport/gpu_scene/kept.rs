@@ -1,6 +1,6 @@
 //! Instances that are kept: their meshes are stored once, in their own space, and an index of two levels places them.
 //!
-//! Kept is an instance of a mesh that is placed more than once, where rays can be traced through its transform. Flattened, as all instances are
+//! Kept is an instance of a mesh that is placed more than once and has an area, where rays can be traced through its transform. Flattened, as all instances are
 //! elsewhere, are those of materials that emit, since light sampling chooses among triangles in world space; those of bodies in scenes with media, which know what is around them; and
 //! those by transforms that are too uneven ([`InstanceTransform::of`]). All triangles have the numbers that they would have if all were
 //! flattened. A kept triangle that lies exactly where an emitting one lies is not looked for, as flattened ones are: light sampling takes the emitter as if it were in front.
@@ -8,12 +8,13 @@
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use super::bodies::bounds_body;
-use super::geometry::{Geometry, corners_of, has_attributes, is_traceable, numbered_instances};
+use super::geometry::{Geometry, TRIANGLE_TEXELS, corners_of, has_attributes, is_traceable, numbered_instances};
+use crate::accel::can_be_met;
 use crate::accel::two_level::{INSTANCE_BYTES, InstanceTransform, MAX_INSTANCES, MeshGeometry, Placement, TwoLevelBvh};
 use crate::accel::wide::WideSettings;
 use crate::gpu::shaders::constants::INSTANCE_IDENTITY;
 use crate::gpu::shaders::types::{SceneInstance, SceneTriangle};
-use crate::scene::{Instance, Mesh, Scene, SceneProfile};
+use crate::scene::{Mesh, Scene, SceneProfile};
 use crate::{Error, Result};
 
 /// How many times what keeping instances needs flattening must need for that to be chosen: rays in two levels take longer.
@@ -27,6 +28,15 @@ const INDEX_TEXELS: u64 = 4;
 
 /// What decoded boxes of a tree's root may exceed those of its mesh by, as a share of their extent: 2/127.
 const BOX_SPARE: f64 = 2.0 / 127.0;
+
+/// What a device has room for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    /// Texels of a buffer.
+    pub texels: u64,
+    /// Bytes of all buffers together.
+    pub bytes: u64,
+}
 
 /// Which instances are kept.
 #[derive(Debug, Clone)]
@@ -51,19 +61,24 @@ impl Keeping {
                 material.is_some_and(|material| material.boundary || profile.media.any() && bounds_body(material));
             !mesh.triangles.is_empty() && !emits && !bounds
         };
-        let parts: Vec<Option<[DVec3; 2]>> = scene
+        let parts: Vec<Option<[[DVec3; 2]; 2]>> = scene
             .meshes
             .iter()
             .zip(&placed)
-            .map(|(mesh, placed)| (*placed > 1 && can_be_kept(mesh)).then(|| spared_box(mesh)))
+            .map(|(mesh, placed)| {
+                let met = || met_box(mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])));
+                let met = (*placed > 1 && can_be_kept(mesh)).then(met).flatten()?;
+                Some([met, spared_box(mesh)])
+            })
             .collect();
         let mut kept_meshes = vec![false; scene.meshes.len()];
         let instances: Vec<bool> = scene
             .instances
             .iter()
             .map(|instance| {
-                let kept = parts[instance.mesh as usize]
-                    .is_some_and(|part| InstanceTransform::of(&instance.transform, &[part]).is_some());
+                // The tree's box lies between both; what is out of range in the mesh's own space need not be so in the world.
+                let fits = |part: [DVec3; 2]| InstanceTransform::of(&instance.transform, &[part]).is_some();
+                let kept = parts[instance.mesh as usize].is_some_and(|parts| parts.into_iter().all(fits));
                 kept_meshes[instance.mesh as usize] |= kept;
                 kept
             })
@@ -77,9 +92,9 @@ impl Keeping {
         (!meshes.is_empty() && scene.instances.len() < MAX_INSTANCES).then_some(Self { instances, meshes })
     }
 
-    /// Whether it is worth it: flattening would need [`WORTH_RATIO`] times as many bytes, and [`WORTH_BYTES`] or more; or would not fit into texel buffers of
-    /// `limit` texels.
-    pub fn pays(&self, scene: &Scene, profile: &SceneProfile, limit: u64) -> bool {
+    /// Whether it is worth it: flattening would need [`WORTH_RATIO`] times as many bytes, and [`WORTH_BYTES`] or more; or what is flattened would not fit the
+    /// device, its triangles, vertices or index into a buffer or all of it into its memory.
+    pub fn pays(&self, scene: &Scene, profile: &SceneProfile, room: Room) -> bool {
         let triangle_bytes = (size_of::<SceneTriangle>() + INDEX_TEXELS as usize * size_of::<[u32; 4]>()) as u64;
         let vector = size_of::<[f32; 4]>() as u64;
         let attributes = [
@@ -93,11 +108,12 @@ impl Keeping {
         let bytes = |mesh: &Mesh| {
             (triangle_bytes + corner_bytes) * mesh.triangles.len() as u64 + vertex_bytes * mesh.positions.len() as u64
         };
-        let (mut flattened, mut kept, mut triangles) = (0, 0, 0);
+        let (mut flattened, mut kept, mut triangles, mut vertices) = (0, 0, 0, 0);
         for (instance, keeps) in scene.instances.iter().zip(&self.instances) {
             let mesh = &scene.meshes[instance.mesh as usize];
             flattened += bytes(mesh);
             triangles += mesh.triangles.len() as u64;
+            vertices += mesh.positions.len() as u64;
             kept += match keeps {
                 true => INSTANCE_BYTES + size_of::<SceneInstance>() as u64,
                 false => bytes(mesh),
@@ -108,9 +124,19 @@ impl Keeping {
             .iter()
             .map(|mesh| bytes(&scene.meshes[*mesh as usize]))
             .sum::<u64>();
-        let fits = INDEX_TEXELS * triangles <= limit;
+        let vertices = if has_attributes(profile) { vertices } else { 0 };
+        let texels = vertices.max(INDEX_TEXELS.max(TRIANGLE_TEXELS) * triangles);
+        let fits = texels <= room.texels && flattened <= room.bytes;
         !fits || flattened >= WORTH_BYTES && flattened >= WORTH_RATIO * kept
     }
+}
+
+/// The box of those triangles that rays can meet; `None` without any.
+pub(super) fn met_box(corners: impl Iterator<Item = [Vec3; 3]>) -> Option<[DVec3; 2]> {
+    let points = corners.filter(can_be_met).flatten();
+    points
+        .map(|p| [p.as_dvec3(); 2])
+        .reduce(|[lower, upper], [p, _]| [lower.min(p), upper.max(p)])
 }
 
 /// The box of a mesh, as much larger as that of its tree may be.
@@ -139,6 +165,7 @@ struct KeptInstance {
     mesh: usize,
     /// Its place among the records.
     record: usize,
+    /// As the scene has been made; where it has moved since, its index knows.
     transform: DAffine3,
 }
 
@@ -232,13 +259,13 @@ impl KeptInstances {
     /// The place of a kept instance among those of its index.
     pub fn placement(&self, object: usize) -> Option<usize> {
         let place = self.place(object)?;
-        Some(place + usize::from(!self.names.is_empty()))
+        Some(place + self.before())
     }
 
     /// The number in the index of a mesh of the scene, and where its triangles are stored; `None` unless it is kept.
     pub fn stored(&self, mesh: u32) -> Option<(usize, usize)> {
         let place = self.meshes.iter().position(|stored| stored.mesh == mesh)?;
-        Some((place + usize::from(!self.names.is_empty()), self.meshes[place].first))
+        Some((place + self.before(), self.meshes[place].first))
     }
 
     /// The first vertex of a mesh that is stored: behind those of what is flattened, and of meshes with lower numbers.
@@ -253,10 +280,38 @@ impl KeptInstances {
         flattened.map(|(instance, _)| vertices(instance.mesh)).sum::<usize>() + before.map(vertices).sum::<usize>()
     }
 
+    /// An error of the index, where it names a placement, in the scene's words.
+    pub fn in_scene(&self, error: Error) -> Error {
+        let (name, value, cause) = match error {
+            Error::Setting { name, value, cause } => (name, value, cause),
+            other => return other,
+        };
+        let of_placement = name.strip_prefix("placements[").and_then(|rest| rest.split_once(']'));
+        let object = of_placement.and_then(|(placement, field)| {
+            let place = placement.parse::<usize>().ok()?.checked_sub(self.before())?;
+            Some((self.instances.get(place)?.object, field))
+        });
+        match object {
+            Some((object, field)) => Error::setting(format!("instances[{object}]{field}"), value, cause),
+            None => Error::Setting { name, value, cause },
+        }
+    }
+
+    /// How many placements of the index come before those of kept instances, and meshes before theirs: what is in world space, if there is any.
+    fn before(&self) -> usize {
+        usize::from(!self.names.is_empty())
+    }
+
+    /// The number in the scene of a placement of the index, if it is of a kept instance.
+    pub fn object(&self, placement: usize) -> Option<usize> {
+        let instance = self.instances.get(placement.checked_sub(self.before())?)?;
+        Some(instance.object)
+    }
+
     /// The index of two levels, and, in the records, its transforms. What is in world space is the first of its meshes, if there is any.
     ///
     /// # Errors
-    /// As [`TwoLevelBvh::build`].
+    /// As [`TwoLevelBvh::build`], with the scene's numbers of instances.
     pub fn index(&mut self, triangles: &[SceneTriangle], settings: &WideSettings) -> Result<TwoLevelBvh> {
         let corners = |range: std::ops::Range<usize>| triangles[range].iter().map(corners_of).collect::<Vec<_>>();
         let in_world = corners(0..self.names.len());
@@ -280,14 +335,14 @@ impl KeptInstances {
             transform: instance.transform,
             first: self.records[instance.record].first,
         }));
-        let index = TwoLevelBvh::build(&meshes, &placements, settings)?;
+        let index = TwoLevelBvh::build(&meshes, &placements, settings).map_err(|error| self.in_scene(error))?;
         self.place_records(&index);
         Ok(index)
     }
 
     /// Writes the transforms of an index to the records.
     pub fn place_records(&mut self, index: &TwoLevelBvh) {
-        let transforms = &index.transforms()[usize::from(!self.names.is_empty())..];
+        let transforms = &index.transforms()[self.before()..];
         for (instance, transform) in self.instances.iter().zip(transforms) {
             placed(&mut self.records[instance.record], transform);
         }
@@ -370,13 +425,6 @@ impl KeptInstances {
         };
         self.instances.iter().map(area).filter(|area| area.is_finite()).sum()
     }
-
-    /// Puts a kept instance to another place.
-    pub fn moved(&mut self, object: usize, transform: &DAffine3) {
-        if let Some(place) = self.place(object) {
-            self.instances[place].transform = *transform;
-        }
-    }
 }
 
 /// Refuses what is not a mesh or an instance that is kept.
@@ -388,133 +436,5 @@ pub(super) fn not_kept<T>(name: &str, number: impl ToString) -> Result<T> {
     ))
 }
 
-/// A mesh of another shape, alone.
-pub(super) fn alone(scene: &Scene, mesh: &Mesh) -> Scene {
-    Scene {
-        materials: scene.materials.clone(),
-        meshes: vec![mesh.clone()],
-        instances: vec![Instance {
-            mesh: 0,
-            transform: DAffine3::IDENTITY,
-            name: String::new(),
-        }],
-        ..Scene::default()
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::Material;
-    use glam::DQuat;
-
-    /// Meshes that are placed once and often, one that shines, one that only a plane would hold, and instances of no triangles.
-    fn scene() -> Scene {
-        let mut scene = Scene::default();
-        let stone = scene.add_material(Material::lambert("stone", Vec3::splat(0.5)));
-        let lamp = scene.add_material(Material {
-            emission: Vec3::ONE,
-            ..Material::lambert("lamp", Vec3::ZERO)
-        });
-        let fan = |material: u32, count: u32| Mesh {
-            positions: (0..count + 2)
-                .map(|i| Vec3::new((i as f32).cos(), 0.1 * i as f32, (i as f32).sin()))
-                .collect(),
-            normals: vec![Vec3::Y; count as usize + 2],
-            triangles: (0..count).map(|i| [i, i + 1, i + 2]).collect(),
-            material: Some(material),
-            ..Mesh::default()
-        };
-        let meshes = [fan(stone, 7), fan(lamp, 3), fan(stone, 5), fan(stone, 0)].map(|mesh| scene.add_mesh(mesh));
-        let turn = DAffine3::from_rotation_translation(DQuat::from_rotation_x(1.1), DVec3::new(3.0, -1.0, 2.0));
-        let flat = DAffine3::from_scale(DVec3::new(1.0, 0.0, 1.0));
-        let mirror = turn * DAffine3::from_scale(DVec3::new(-2.0, 2.0, 2.0));
-        let places = [
-            (2, DAffine3::IDENTITY),
-            (0, turn),
-            (1, turn),
-            (1, DAffine3::IDENTITY),
-            (0, flat),
-            (0, mirror),
-            (3, turn),
-            (0, DAffine3::IDENTITY),
-            (3, mirror),
-        ];
-        scene.instances = places
-            .into_iter()
-            .map(|(mesh, transform): (usize, DAffine3)| Instance {
-                mesh: meshes[mesh],
-                transform,
-                name: String::new(),
-            })
-            .collect();
-        scene
-    }
-
-    #[test]
-    fn triangles_have_the_numbers_and_places_of_flattened_ones() {
-        let scene = scene();
-        let profile = SceneProfile::of(&scene);
-        let keeping = Keeping::of(&scene, &profile).expect("a mesh that is placed often");
-        let kept_objects: Vec<usize> = (0..scene.instances.len()).filter(|i| keeping.instances[*i]).collect();
-        assert_eq!((kept_objects, keeping.meshes.clone()), (vec![1, 5, 7], vec![0]));
-        let flat = Geometry::flatten(&scene, &profile).expect("small");
-        let mut all = Geometry::keep(&scene, &profile, &keeping).expect("small");
-        let mut kept = all.kept.clone().expect("instances");
-        let index = kept.index(&all.triangles, &WideSettings::default()).expect("valid");
-        assert_eq!(index.work().meshes, 2);
-        all.kept = Some(kept.clone());
-        let records = &kept.records;
-        assert!(records.is_sorted_by_key(|record| record.first));
-        // Three that are kept, and four runs of others, the last of no triangles.
-        assert_eq!((records.len(), all.triangles.len()), (7, 5 + 2 * 3 + 7 + 7));
-        for (number, expected) in flat.triangles.iter().enumerate() {
-            let number = number as u32;
-            let record = &records[records.partition_point(|record| record.first <= number) - 1];
-            let stored = (record.record + number - record.first) as usize;
-            let found = &all.triangles[stored];
-            assert_eq!(found.material, expected.material);
-            if stored < all.in_world() {
-                assert_eq!((found, all.name(stored)), (expected, number));
-                continue;
-            }
-            let instance = kept
-                .instances
-                .iter()
-                .find(|instance| records[instance.record].first == record.first);
-            let transform = InstanceTransform::of(
-                &instance.expect("a kept instance").transform,
-                &[spared_box(&scene.meshes[0])],
-            );
-            let image = transform.expect("a transform").triangle(corners_of(found));
-            for (a, b) in image.into_iter().zip(corners_of(expected)) {
-                assert!((a - b).abs().max_element() < 1e-5, "{number}: {a} {b}");
-            }
-        }
-        let (bounds, area) = (flat.bounds(), flat.surface_area());
-        for (a, b) in all.bounds().into_iter().zip(bounds) {
-            assert!((a - b).abs().max_element() < 1e-5, "{a} {b}");
-        }
-        assert!(
-            (all.surface_area() / area - 1.0).abs() < 1e-6,
-            "{} {area}",
-            all.surface_area()
-        );
-        assert_eq!(kept.first_vertex(&scene, 0), all.normals.len() - 9);
-    }
-
-    #[test]
-    fn keeping_pays_where_flattening_needs_much_more_or_does_not_fit() {
-        let mut scene = scene();
-        scene.meshes[0].triangles = vec![[0, 1, 2]; 10_000];
-        let profile = SceneProfile::of(&scene);
-        let pays = |scene: &Scene, limit| Keeping::of(scene, &profile).is_some_and(|k| k.pays(scene, &profile, limit));
-        assert!(!pays(&scene, u64::MAX), "few bytes");
-        assert!(pays(&scene, 100_000), "does not fit");
-        let instance = scene.instances[1].clone();
-        scene.instances.extend(vec![instance; 60]);
-        assert!(pays(&scene, u64::MAX), "80 MB, and 61 for one");
-        scene.instances.truncate(1);
-        assert!(Keeping::of(&scene, &profile).is_none(), "nothing is placed twice");
-    }
-}
+mod tests;

@@ -2,14 +2,42 @@
 
 use super::textures::Textures;
 use crate::gpu::shaders::constants::{
-    MATERIAL_BLEND, MATERIAL_BOUNDARY, MATERIAL_CONDUCTOR, MATERIAL_DOUBLE_SIDED, MATERIAL_FORM_SHIFT, MATERIAL_MASK,
-    MATERIAL_PHONG, MATERIAL_UNLIT,
+    MATERIAL_BLEND, MATERIAL_BOUNDARY, MATERIAL_DOUBLE_SIDED, MATERIAL_EXACT_CONDUCTOR, MATERIAL_FORM_SHIFT,
+    MATERIAL_MASK, MATERIAL_PHONG, MATERIAL_UNLIT,
 };
 use crate::gpu::shaders::types::SceneMaterial;
-use crate::scene::{AlphaMode, Material, Scene};
+use crate::scene::{AlphaMode, ConductorIor, FresnelForm, Material, Scene};
 use crate::transport::bsdf::{classic_flags, conductor_flag};
 use crate::transport::fresnel::form::MetalFresnel;
-use glam::DVec3;
+use std::collections::HashMap;
+
+/// A metal in records: flags of its Fresnel factor, and what that is evaluated from.
+type MetalRecord = (u32, [[f32; 3]; 3]);
+
+/// The metals of a scene, each made once however many materials have it: a fit takes milliseconds.
+#[derive(Default)]
+pub(super) struct Metals {
+    /// By form and the bits of the index.
+    known: HashMap<(FresnelForm, [u32; 6]), MetalRecord>,
+    /// How many were made.
+    made: usize,
+}
+
+impl Metals {
+    fn record(&mut self, form: FresnelForm, ior: ConductorIor) -> MetalRecord {
+        let [a, b, c] = ior.eta.to_array().map(f32::to_bits);
+        let [d, e, f] = ior.k.to_array().map(f32::to_bits);
+        *self.known.entry((form, [a, b, c, d, e, f])).or_insert_with(|| {
+            self.made += 1;
+            let fresnel = MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3());
+            let flags = match fresnel {
+                MetalFresnel::Exact { .. } => MATERIAL_EXACT_CONDUCTOR,
+                _ => conductor_flag(&fresnel) << MATERIAL_FORM_SHIFT,
+            };
+            (flags, fresnel.parameters().map(|v| v.as_vec3().to_array()))
+        })
+    }
+}
 
 /// All materials with whether some instance places them; last the default one, for meshes that have none.
 pub(super) fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> Vec<(&'a Material, bool)> {
@@ -21,17 +49,17 @@ pub(super) fn materials_by_use<'a>(scene: &'a Scene, default: &'a Material) -> V
     scene.materials.iter().chain([default]).zip(used).collect()
 }
 
-/// A material as the kernels read it; its textures join the others.
-pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Material) -> SceneMaterial {
-    let fresnel = m
-        .conductor
-        .map(|c| MetalFresnel::new(m.fresnel, c.eta.as_dvec3(), c.k.as_dvec3()));
-    let exact = matches!(fresnel, Some(MetalFresnel::Exact { .. }));
-    let microfacets = m.microfacets.map_or(0, classic_flags) << MATERIAL_FORM_SHIFT;
-    let form = fresnel.as_ref().filter(|_| !exact).map_or(0, conductor_flag) << MATERIAL_FORM_SHIFT;
-    let [conductor_eta, conductor_k, conductor_average] = fresnel
-        .map_or([DVec3::ONE, DVec3::ZERO, DVec3::ZERO], |fresnel| fresnel.parameters())
-        .map(|v| v.as_vec3().to_array());
+/// A material as the kernels read it; its textures and its metal join the others.
+pub(super) fn material_record(
+    textures: &mut Textures,
+    metals: &mut Metals,
+    scene: &Scene,
+    m: &Material,
+) -> SceneMaterial {
+    let microfacets = m.classic_microfacets.map_or(0, classic_flags) << MATERIAL_FORM_SHIFT;
+    let no_metal = (0, [[1.0; 3], [0.0; 3], [0.0; 3]]);
+    let (form, [conductor_a, conductor_b, conductor_c]) =
+        m.conductor.map_or(no_metal, |ior| metals.record(m.fresnel, ior));
     let flag = |on: bool, bit| if on { bit } else { 0 };
     let (cutoff, alpha_flag) = match m.alpha_mode {
         AlphaMode::Opaque => (0.0, 0),
@@ -52,11 +80,11 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         metallic: m.metallic,
         specular_color: m.specular_color.to_array(),
         roughness: m.roughness,
-        conductor_eta,
+        conductor_a,
         transmission: m.transmission,
-        conductor_k,
+        conductor_b,
         ior: m.ior,
-        conductor_average,
+        conductor_c,
         specular: m.specular,
         absorption: absorption.as_vec3().to_array(),
         thickness: m.thickness,
@@ -64,7 +92,6 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         normal_scale: m.normal_scale,
         flags: flag(m.double_sided, MATERIAL_DOUBLE_SIDED)
             | flag(m.unlit, MATERIAL_UNLIT)
-            | flag(exact, MATERIAL_CONDUCTOR)
             | form
             | microfacets
             | flag(m.phong, MATERIAL_PHONG)
@@ -79,5 +106,33 @@ pub(super) fn material_record(textures: &mut Textures, scene: &Scene, m: &Materi
         transmission_texture: textures.record(scene, m.transmission_texture, false),
         interior: interior.map_or(0, |index| index + 1),
         spare: 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::metals;
+
+    #[test]
+    fn a_metal_is_fitted_once() {
+        let mut made = Metals::default();
+        let named = |name: &str| metals::by_name(name).expect("metal");
+        let mut other = named("gold");
+        other.k.z += 1e-6;
+        for _ in 0..3 {
+            for (form, ior) in [
+                (FresnelForm::Compensated, named("gold")),
+                (FresnelForm::Compensated, named("silver")),
+                (FresnelForm::Compensated, other),
+                (FresnelForm::Exact, named("gold")),
+            ] {
+                let fresnel = MetalFresnel::new(form, ior.eta.as_dvec3(), ior.k.as_dvec3());
+                let (flags, parameters) = made.record(form, ior);
+                assert_eq!(parameters, fresnel.parameters().map(|v| v.as_vec3().to_array()));
+                assert_eq!(flags == MATERIAL_EXACT_CONDUCTOR, form == FresnelForm::Exact);
+            }
+        }
+        assert_eq!(made.made, 4);
     }
 }

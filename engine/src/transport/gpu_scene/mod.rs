@@ -24,18 +24,18 @@ use glam::{DVec3, Vec3};
 use self::bodies::Bodies;
 use self::geometry::{Geometry, check_placed, visible_objects};
 use self::index::{index_for, index_over_instances};
-use self::kept::{Keeping, KeptInstances};
+use self::kept::{Keeping, KeptInstances, Room};
 use self::light_tree::TreeOfLights;
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
-use self::materials::{material_record, materials_by_use};
+use self::materials::{Metals, material_record, materials_by_use};
 use self::media::GpuMedia;
 use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
 use super::bsdf::BsdfFeatures;
 use crate::accel::two_level::{TwoLevelBvh, TwoLevelWork};
-use crate::accel::{Aabb, DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, IndexReport, IndexStatistics};
+use crate::accel::{DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, IndexReport, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{self, SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::sets::{MediaSet, SceneSet};
@@ -61,8 +61,6 @@ pub struct GpuScene {
     punctual_lights: PunctualLights,
     light_tree: TreeOfLights,
     index: IndexOnDevice,
-    /// Box of what rays may meet in the index, where instances are kept.
-    index_bounds: Aabb,
     /// Where instances are kept: what moves them.
     kept: Option<Mutex<Kept>>,
     buffers: SceneBuffers,
@@ -136,10 +134,11 @@ impl GpuScene {
     /// As [`GpuScene::new`], with the ray index of the host's choice. Pictures do not depend on it, but for two levels. A kd-tree with a leaf that is too long for a software device's loops,
     /// as where thousands of triangles lie in one place, is replaced by the binned hierarchy, and the report says so ([`IndexReport::instead_because`]).
     ///
-    /// With [`IndexKind::TwoLevel`] instances are kept: meshes that are placed more than once are stored once, but for those that emit light, those that are
+    /// With [`IndexKind::TwoLevel`] instances are kept: meshes that are placed more than once are stored once, but for those that emit light, those without an area, those that are
     /// bodies in scenes with media, and instances by transforms too uneven for rays ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)). Their vertices are in
     /// other places by rounding in f32, so pictures differ by as much. [`IndexKind::Automatic`] keeps instances where flattening them would need at least eight times as
-    /// many bytes of geometry and index as that, and 64 MiB or more, or more texels than the device can bind; elsewhere it is the wide hierarchy.
+    /// many bytes of geometry and index as that, and 64 MiB or more, or more texels than the device can bind, or more bytes than it has memory; elsewhere it is the
+    /// wide hierarchy.
     /// What is rasterized needs flattened scenes.
     ///
     /// # Errors
@@ -157,10 +156,14 @@ impl GpuScene {
         scene.check()?;
         let mut profile = SceneProfile::of(scene);
         let limit = gpu.caps().max_texel_buffer_elements;
+        let room = Room {
+            texels: limit,
+            bytes: gpu.caps().device_heap,
+        };
         let keeping = match kind {
             IndexKind::TwoLevel(settings) => Keeping::of(scene, &profile).map(|keeping| (keeping, settings)),
             IndexKind::Automatic(settings) => Keeping::of(scene, &profile)
-                .filter(|keeping| keeping.pays(scene, &profile, limit))
+                .filter(|keeping| keeping.pays(scene, &profile, room))
                 .map(|keeping| (keeping, settings)),
             _ => None,
         };
@@ -186,10 +189,10 @@ impl GpuScene {
             .iter()
             .filter(|(material, placed)| *placed && !material.boundary);
         let bsdf = BsdfFeatures::of_materials(placed.map(|(material, _)| *material));
-        let mut textures = Textures::default();
+        let (mut textures, mut metals) = (Textures::default(), Metals::default());
         let records: Vec<_> = materials
             .iter()
-            .map(|(material, _)| material_record(&mut textures, scene, material))
+            .map(|(material, _)| material_record(&mut textures, &mut metals, scene, material))
             .collect();
         let lights = Lights::collect(scene, &profile, &mut geometry, &records, bounds)?;
         let albedo: &[f32] = if bsdf.specular_layer || bsdf.multiple_scattering {
@@ -216,7 +219,6 @@ impl GpuScene {
             punctual_lights: lights.punctual,
             light_tree: lights.tree,
             index,
-            index_bounds: kept.as_ref().map_or(Aabb::EMPTY, |kept| lock(kept).index.bounds()),
             kept,
             buffers,
             media,
@@ -238,14 +240,18 @@ impl GpuScene {
         self.bsdf
     }
 
-    /// Size and quality of its ray index.
+    /// Size and quality of its ray index, as it is now.
     pub fn index_statistics(&self) -> IndexStatistics {
-        self.index.report.statistics
+        let built = self.index.report.statistics;
+        self.kept.as_ref().map_or(built, |kept| lock(kept).index.statistics())
     }
 
-    /// Which ray index it has and how long its build took, with size and quality.
+    /// Which ray index it has and how long its build took, with size and quality as they are now.
     pub fn index_report(&self) -> IndexReport {
-        self.index.report
+        IndexReport {
+            statistics: self.index_statistics(),
+            ..self.index.report
+        }
     }
 
     /// How kernels traverse its ray index.
@@ -304,7 +310,7 @@ impl GpuScene {
         }
     }
 
-    /// Area of all triangles, m².
+    /// Area of all triangles, m², as the scene has been made: what moves or is refitted since does not change it.
     pub fn surface_area(&self) -> f64 {
         self.surface_area
     }
@@ -448,7 +454,7 @@ impl GpuScene {
     }
 }
 
-/// What is behind a lock, also where a thread has panicked that held it: what it holds is changed as a whole.
+/// What is behind a lock, also where a thread has panicked that held it.
 fn lock(kept: &Mutex<Kept>) -> std::sync::MutexGuard<'_, Kept> {
     kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

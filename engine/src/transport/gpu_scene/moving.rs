@@ -3,12 +3,13 @@
 use glam::{DAffine3, Vec3};
 
 use super::geometry::{Geometry, corners_of, instances_in_order};
-use super::kept::{alone, not_kept};
+use super::kept::{met_box, not_kept};
 use super::{GpuScene, Kept, lock};
-use crate::accel::RayIndex;
-use crate::accel::two_level::TwoLevelBvh;
+use crate::accel::two_level::InstanceTransform;
+use crate::accel::{Aabb, RayIndex, can_be_met};
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::gpu::{Gpu, TexelView};
+use crate::scene::check::check_mesh;
 use crate::scene::{Instance, Mesh, Scene};
 use crate::{Error, Result};
 
@@ -82,14 +83,15 @@ impl GpuScene {
     }
 
     /// Puts instances of the scene, by their numbers, to other places, where instances are kept: rays meet them there from here on, as if the scene had been
-    /// made so. Of the index only the tree over the instances is made anew ([`GpuScene::index_work`] counts).
+    /// made so. Of the index only the tree over the instances is made anew ([`GpuScene::index_work`] counts). What is known of the scene as a whole stays: its
+    /// box ([`GpuScene::bounds`]), with the power of distant lights, and its [`GpuScene::surface_area`].
     ///
     /// Pictures under way must be restarted, or they mix both; nothing that reads the scene may be under way.
     ///
     /// # Errors
     /// [`Error::Setting`] for an instance that is not kept, for a transform that rays cannot be traced through
-    /// ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)), and for one that would leave the box around the scene, and nothing
-    /// has moved then; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)), and for one by which a triangle would leave the box around the scene, and
+    /// nothing has moved then; [`Error::DeviceLost`], [`Error::OutOfMemory`], after which the scene has to be made again.
     pub fn move_instances(&self, gpu: &Gpu, moves: &[(usize, DAffine3)]) -> Result<()> {
         let Some(kept) = &self.kept else {
             return not_kept("instances", moves.len());
@@ -100,27 +102,26 @@ impl GpuScene {
             let Some(placement) = kept.instances.placement(*object) else {
                 return not_kept("object", object);
             };
+            let found = kept.index.transform(placement, transform);
+            let found = found.map_err(|error| kept.instances.in_scene(error))?;
+            let triangles = kept.index.corners_at(placement);
+            self.check_inside(*object, &found, Some(&found.bounds), triangles)?;
             placements.push((placement, *transform));
         }
-        let mut index = kept.index.clone();
-        index.move_instances(&placements)?;
-        self.check_inside(&index)?;
-        for (object, transform) in moves {
-            kept.instances.moved(*object, transform);
-        }
-        self.upload_kept(gpu, &mut kept, index, None)
+        kept.index.move_instances(&placements)?;
+        self.upload_kept(gpu, &mut kept, None)
     }
 
     /// Gives a mesh of the scene that is kept another shape: as many vertices, and the same triangles. Its tree keeps its form, so rays are fast where
-    /// little has moved. Normals and tangents are those of `mesh`; colours and texture coordinates stay.
+    /// little has moved. Normals and tangents are those of `mesh`; colours and texture coordinates stay, and what [`GpuScene::move_instances`] says.
     ///
     /// `scene` is the one that this was made of. Pictures under way must be restarted, or they mix both; nothing that reads the scene may be under way.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a mesh that is not kept, or has other triangles or another number of vertices, normals or tangents, and for one that would leave the box
-    /// around the scene, and nothing has changed then; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`Error::Setting`] for a mesh that is not kept, that [`Scene::check`] would refuse, or that has other triangles or another number of vertices, normals or tangents, for
+    /// one that its instances cannot place, and for one by which a triangle would leave the box around the scene, and nothing has changed then; [`Error::DeviceLost`],
+    /// [`Error::OutOfMemory`], after which the scene has to be made again.
     pub fn refit_mesh(&self, gpu: &Gpu, scene: &Scene, number: usize, mesh: &Mesh) -> Result<()> {
-        let refuse = |cause: &str| Err(Error::setting("mesh", number, cause));
         let Some(kept) = &self.kept else {
             return not_kept("mesh", number);
         };
@@ -133,18 +134,33 @@ impl GpuScene {
         };
         let lengths = |mesh: &Mesh| [mesh.positions.len(), mesh.normals.len(), mesh.tangents.len()];
         if mesh.triangles != known.triangles || lengths(mesh) != lengths(known) {
-            return refuse("has other triangles, or another number of vertices, normals or tangents");
+            let cause = "has other triangles, or another number of vertices, normals or tangents";
+            return Err(Error::setting("mesh", number, cause));
         }
         let shape = Mesh {
             material: known.material,
             ..mesh.clone()
         };
-        let moved = Geometry::flatten(&alone(scene, &shape), &self.profile)?;
+        if let Err((field, cause)) = check_mesh(&shape, scene.materials.len()) {
+            return Err(Error::setting(format!("mesh{field}"), number, cause));
+        }
+        let mut moved = Geometry::default();
+        moved.store(scene, &shape, &self.profile)?;
         let corners: Vec<[Vec3; 3]> = moved.triangles.iter().map(corners_of).collect();
-        let mut index = kept.index.clone();
-        index.refit_mesh(place, &corners)?;
-        self.check_inside(&index)?;
-        self.upload_kept(gpu, &mut kept, index, Some(place))?;
+        let part = met_box(corners.iter().copied());
+        for (i, placement) in kept.index.placements().iter().enumerate() {
+            let Some(object) = kept.instances.object(i).filter(|_| placement.mesh as usize == place) else {
+                continue;
+            };
+            let loose = part.and_then(|part| InstanceTransform::of(&placement.transform, &[part]));
+            let met = corners.iter().copied().filter(can_be_met);
+            // Images are made by what does not depend on the shape.
+            let transform = &kept.index.transforms()[i];
+            self.check_inside(object, transform, loose.map(|loose| loose.bounds).as_ref(), met)?;
+        }
+        let refitted = kept.index.refit_mesh(place, &corners);
+        refitted.map_err(|error| kept.instances.in_scene(error))?;
+        self.upload_kept(gpu, &mut kept, Some(place))?;
         gpu.upload(
             self.buffers.triangles.buffer(),
             (first * size_of::<SceneTriangle>()) as u64,
@@ -161,32 +177,35 @@ impl GpuScene {
         upload(&self.buffers.tangents, &moved.tangents)
     }
 
-    /// Refuses an index that reaches beyond the box around the scene, by more than boxes of instances exceed what is in them.
-    fn check_inside(&self, index: &TwoLevelBvh) -> Result<()> {
+    /// Refuses an instance that would reach beyond the box around the scene: by its loose box or else by its triangles' images.
+    fn check_inside(
+        &self,
+        object: usize,
+        transform: &InstanceTransform,
+        loose: Option<&Aabb>,
+        triangles: impl Iterator<Item = [Vec3; 3]>,
+    ) -> Result<()> {
         let [lower, upper] = self.bounds;
-        let bounds = index.bounds();
-        let before = self.index_bounds;
-        let inside =
-            bounds.lower.cmpge(lower.min(before.lower)).all() && bounds.upper.cmple(upper.max(before.upper)).all();
-        if inside {
+        let inside = |low: Vec3, high: Vec3| low.cmpge(lower).all() && high.cmple(upper).all();
+        let is_inside = loose.is_some_and(|loose| inside(loose.lower, loose.upper))
+            || triangles
+                .flat_map(|triangle| transform.triangle(triangle))
+                .all(|p| inside(p, p));
+        if is_inside {
             return Ok(());
         }
-        Err(Error::setting(
-            "instances",
-            format!("{bounds:?}"),
-            "would leave the box around the scene",
-        ))
+        let cause = format!("would leave the box around the scene, from {lower} to {upper}");
+        Err(Error::setting("object", object, cause))
     }
 
-    /// Uploads what differs in another index, and has it instead.
-    fn upload_kept(&self, gpu: &Gpu, kept: &mut Kept, index: TwoLevelBvh, mesh: Option<usize>) -> Result<()> {
+    /// Uploads what has changed in the index.
+    fn upload_kept(&self, gpu: &Gpu, kept: &mut Kept, mesh: Option<usize>) -> Result<()> {
+        let Kept { instances, index } = kept;
         let meshes = mesh.map(|mesh| index.mesh_texels(mesh)).into_iter().flatten();
         for range in [index.top_texels(), index.instance_texels()].into_iter().chain(meshes) {
             let offset = (range.start * size_of::<[u32; 4]>()) as u64;
             gpu.upload(self.index.texels.buffer(), offset, &index.texels()[range])?;
         }
-        kept.index = index;
-        let Kept { instances, index } = kept;
         instances.place_records(index);
         gpu.upload(self.buffers.instances.buffer(), 0, &instances.records)
     }
