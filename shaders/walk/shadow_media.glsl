@@ -58,7 +58,7 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
             GridWalk walk = begin_grid_walk(m, s.origin, s.direction, state.start, state.hit.t);
             walk.draw = state.grid_walks << GRID_WALK_SHIFT;
             ++state.grid_walks;
-            uvec4 key = uvec4(walk_sequence(s.slot), walk_index(s.slot), SHADOW_KEY + status.rounds, push.key.seed);
+            uvec4 key = uvec4(walk_sequence(s.slot), walk_index(s.slot), SHADOW_KEY + walk_round(s.slot), push.key.seed);
             outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
             COUNT_MEDIUM(density_lookups, walk.nulls)
             float reached = resumed_start(state.start, walk.entry + walk.t);

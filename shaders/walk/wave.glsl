@@ -126,6 +126,7 @@ layout(set = 0, binding = 0, scalar) restrict buffer WaveStatusBlock {
     uint waited[2];          // places that have waited
     uint unstarted;          // 1 where places were left for later, since the submission's work was used up
     coherent int work_left;  // of this submission, in units of WORK_UNIT iterations; the places under way may take it below 0
+    uint oldest;             // of a wave that is kept full: what its owner has numbered the walk by that is first in the queue
 } status;
 layout(set = 0, binding = 1) uniform utextureBuffer walk_queue_in;
 layout(set = 0, binding = 2, scalar) restrict writeonly buffer WalkQueueOut { uint walk_queue_out[]; };
@@ -159,7 +160,8 @@ layout(set = 0, binding = 21, scalar) restrict buffer WalkMediumCounters {
     uint second_rays[2];  // of places that have one already
 } medium_counters;
 
-// Sequence and place in it of the walk in each slot, where walks have numbers of their own instead of those of a WalkKey; elsewhere some other buffer is bound.
+// Sequence and place in it of the walk in each slot, where walks have numbers of their own instead of those of a WalkKey; elsewhere some other buffer is bound. Of a
+// wave that is kept full also the round that the walk began in, and a number of its owner's; 0 stands for the round elsewhere.
 layout(set = 0, binding = 22) uniform utextureBuffer walk_numbers_in;
 
 #define COUNT_MEDIUM(COUNTER, AMOUNT) { \

@@ -34,6 +34,8 @@ pub struct WaveInFlight {
     pub(super) key: WalkKey,
     pub(super) status: Status,
     pub(super) next: Next,
+    /// Walks that the next submission begins behind those that are alive, of a wave that is kept full.
+    pub(super) begins: u32,
     /// Some rays of the stage that goes on were stopped by a quota, rather than left for later before they began.
     pub(super) resumes: bool,
     /// Places of the bounce at which an arrival stage was stopped by its quota.
@@ -89,6 +91,21 @@ impl WaveInFlight {
     /// Whether all walks have ended and nothing waits.
     pub fn has_ended(&self) -> bool {
         self.next == Next::End
+    }
+
+    /// Whether it lies between two bounces, all of what came before being done.
+    pub fn is_between_bounces(&self) -> bool {
+        matches!(self.next, Next::Bounce | Next::End)
+    }
+
+    /// Walks that are alive.
+    pub fn walks(&self) -> u32 {
+        self.status.active_count
+    }
+
+    /// Of a wave that is kept full and has walks: the number that its owner has given the walk that began first of them, and before the last refill.
+    pub fn oldest(&self) -> u32 {
+        self.status.oldest
     }
 
     /// After a submission that began with `from`: what the next one begins with.

@@ -95,7 +95,7 @@ float reckoned_collision_density(SceneMedium m, vec3 bands, float t, GridWalk wa
 // Light scattered once on the way, at a place chosen by the angle under which a point of a light sees it (Kulla and Fajardo 2012, 4.1 and 4.2).
 // True where there is some.
 bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, uint interior, Segment segment, GridWalk walk) {
-    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * status.rounds + DIMENSION_AIRLIGHT;
+    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot) + DIMENSION_AIRLIGHT;
     uvec2 word = sampler_bits(walk_sampler(slot, dimension));
     uint place_word = word.y;
     LightChoice choice = choose_light_by_power(word, pcg3d(uvec3(word, 0u)).x);
@@ -103,7 +103,7 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
         return false;
     }
     if (HAS_AREA_LIGHTS && choice.light.kind == LIGHT_TRIANGLE) {
-        place_word = sampler_bits(walk_sampler(slot, DIMENSION_FIRST_PLACE + status.rounds)).x;
+        place_word = sampler_bits(walk_sampler(slot, DIMENSION_FIRST_PLACE + walk_round(slot))).x;
     }
     LightPoint point = light_point(choice, word, push.scene_lower, push.scene_upper);
     EquiAngular e = airlight_from(path, bands, m, segment, walk, point.point.position);
@@ -245,8 +245,8 @@ void main() {
     bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
     bool lighting = lit && scattering && path_set_contains(push.path_set, path.bounce + 1u);
     lighting = lighting && (!HAS_PATH_AUTOMATON || (push.accepting >> after & 1u) != 0u);
-    // Draws of the medium are numbered by the round, which is the number of the path's ways so far.
-    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * status.rounds;
+    // Draws of the medium are numbered by the path's round, which is the number of its ways so far.
+    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
     if (medium != NO_MEDIUM && way.end > way.start) {
         m = load_medium(medium);
         // Where collisions would only end the path, it goes on in proportion to the transmittance instead.

@@ -8,7 +8,7 @@ use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::{
-    path_camera, path_medium, path_numbers, path_resolve, path_resolve_shares, path_shade,
+    path_camera, path_medium, path_numbers, path_refill, path_resolve, path_resolve_shares, path_retire, path_shade,
 };
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
 use crate::gpu::{Buffer, PipelineInfo};
@@ -25,7 +25,7 @@ use crate::transport::{COMPENSATION, METAL_LOBES, PathSet, SURFACE_FEATURES};
 pub(in crate::techniques) const CARD: Card = Card {
     id: "path",
     summary: "unidirectional path tracing with next-event estimation and multiple importance sampling",
-    rows: &[ROWS, super::ROWS, super::adaptive::ROWS],
+    rows: &[ROWS, super::ROWS, super::full::ROWS, super::adaptive::ROWS],
     bias: Bias::Unbiased,
     needs: &[],
     kernels: &[&KERNELS],
@@ -76,8 +76,10 @@ fn law(settings: &Settings) -> Result<Law> {
 }
 
 /// What a picture may take, of whatever scene.
-pub(in crate::techniques) const KERNELS: [&ShaderInfo; 11] = [
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 13] = [
     &path_camera::INFO,
+    &path_refill::INFO,
+    &path_retire::INFO,
     &extend::INFO,
     &path_medium::INFO,
     &path_shade::INFO,
@@ -123,6 +125,7 @@ impl Technique for PathTracer {
             ("shadow_rays", c.shadow_rays),
             ("rays", c.extend_rays + c.shadow_rays),
             ("waves", c.waves),
+            ("slots", self.slots().into()),
             ("stalls", c.stalls),
             ("postponed", c.postponed),
             ("medium_collisions", c.medium_collisions),
