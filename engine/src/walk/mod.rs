@@ -23,7 +23,7 @@ mod walker;
 mod wave;
 
 pub use arrival::{ArrivalStage, Places, StoppedPlaces};
-pub use in_flight::{Walked, WaveInFlight};
+pub use in_flight::{Fetches, Walked, WaveInFlight};
 pub use stages::{Refill, WalkStages};
 pub use trace::{RAY_QUOTA, ray_quota};
 pub use turnover::Turnover;

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use super::arrival::{Places, StoppedPlaces};
 use super::compaction::Compaction;
-use super::in_flight::{Next, Walked, WaveInFlight};
+use super::in_flight::{Fetches, Next, Walked, WaveInFlight};
 use super::stages::{Refill, WalkStages};
 use super::stall::StallWatch;
 use super::trace::{RAY_QUOTA, TracePipelines, ray_quota};
@@ -57,6 +57,8 @@ pub struct WalkOptions {
     /// Work, in loop iterations, after which a submission begins no further place: those of long rays, four times those of walks through grids of densities, and twice
     /// those of queries of maps. The places under way end as their quotas say. 0 chooses by the kind of device.
     pub work: u64,
+    /// Counts what the stages that trace rays fetch beside the index ([`Walked::fetches`]), by other kernels.
+    pub count_fetches: bool,
 }
 
 impl Default for WalkOptions {
@@ -67,6 +69,7 @@ impl Default for WalkOptions {
             ray_quota: RAY_QUOTA,
             bounces: 12,
             work: 0,
+            count_fetches: false,
         }
     }
 }
@@ -136,7 +139,7 @@ impl Walker {
             (wanted, _) => wanted,
         };
         Ok(Self {
-            trace: TracePipelines::new(gpu, &scene, &buffers, quota, options.shadows, false)?,
+            trace: TracePipelines::new(gpu, &scene, &buffers, quota, &options, false)?,
             resume: None,
             compaction: Compaction::new(gpu, buffers.turnover().is_some())?,
             pace: Pace::new(gpu.caps().kind, bounces),
@@ -329,13 +332,12 @@ impl Walker {
     fn submit(&mut self, wave: &mut WaveInFlight, stages: &mut dyn WalkStages) -> Result<()> {
         let resumes = wave.resumes && matches!(wave.next, Next::Hits | Next::Shadows);
         if resumes && self.resume.is_none() {
-            let shadows = self.options.shadows;
             self.resume = Some(TracePipelines::new(
                 &self.gpu,
                 &self.scene,
                 &self.buffers,
                 self.quota,
-                shadows,
+                &self.options,
                 true,
             )?);
         }
@@ -358,6 +360,7 @@ impl Walker {
         walked.timings.push(timings);
         walked.rays = wide_counter(wave.status.rays);
         walked.waited = wide_counter(wave.status.waited);
+        walked.fetches = Fetches::of(&wave.status);
         let units = i64::from(self.work_units) - i64::from(wave.status.work_left);
         walked.work += units.unsigned_abs() * u64::from(WORK_UNIT);
         if let Some(media) = &self.buffers.media {

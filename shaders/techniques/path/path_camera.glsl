@@ -34,7 +34,7 @@ void begin_path(uint slot, uint sample_slot) {
         origin += offset;
         direction = direction * push.view.focus_distance - offset;
     }
-    walk_states_out[slot] = WalkState(origin, 0.0, normalize(direction), 0u, vec3(1.0), 1.0);
+    walk_states_out[slot] = WalkState(origin, 1.0, normalize(direction), 0u, vec3(1.0), 0.0);
     walk_gathered[slot] = GatheredLight(vec3(0.0), push.view.interior);
     if (WRITE_AOVS) {
         path_aovs[slot].filled = 0u;

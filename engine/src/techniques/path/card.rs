@@ -92,6 +92,10 @@ pub(in crate::techniques) const KERNELS: [&ShaderInfo; 13] = [
     &path_resolve_shares::INFO,
 ];
 
+/// Counters of what is fetched, by [`Fetches::STAGES`](crate::walk::Fetches::STAGES).
+const FETCHED_TEXELS: [&str; 4] = ["extend_texels", "medium_texels", "shade_texels", "shadow_texels"];
+const FETCHED_BYTES: [&str; 4] = ["extend_bytes", "medium_bytes", "shade_bytes", "shadow_bytes"];
+
 impl Technique for PathTracer {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         PathTracer::step(self, samples)
@@ -119,7 +123,7 @@ impl Technique for PathTracer {
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         let c = PathTracer::counters(self);
-        BTreeMap::from([
+        let mut all = BTreeMap::from([
             ("paths", c.paths),
             ("extend_rays", c.extend_rays),
             ("shadow_rays", c.shadow_rays),
@@ -131,7 +135,12 @@ impl Technique for PathTracer {
             ("medium_collisions", c.medium_collisions),
             ("null_collisions", c.null_collisions),
             ("density_lookups", c.density_lookups),
-        ])
+        ]);
+        if PathTracer::settings(self).count_fetches {
+            all.extend(FETCHED_TEXELS.into_iter().zip(c.fetches.texels));
+            all.extend(FETCHED_BYTES.into_iter().zip(c.fetches.bytes));
+        }
+        all
     }
 
     fn pipelines(&self) -> Vec<PipelineInfo> {
@@ -174,6 +183,8 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
         "tests/tests/bounded_steps.rs::a_step_through_a_sparse_grid_is_one_submission_of_bounded_work",
         "tests/tests/bounded_steps.rs::rays_through_equal_triangles_are_parted_and_none_is_lost",
+        "tests/tests/fetches.rs::stages_fetch_what_is_counted",
+        "tests/tests/fetches.rs::diffuse_scenes_fetch_few_texels_a_segment",
     ],
     experiment: "clerestory agreement",
     api: &["clerestory::techniques::PathTracer"],

@@ -47,7 +47,7 @@ use crate::scene::camera_frame::CameraFrame;
 use crate::settings::TypedSettings;
 use crate::transport::GpuScene;
 use crate::walk::{
-    ArrivalStage, Turnover, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
+    ArrivalStage, Fetches, Turnover, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
     slots_of_device,
 };
 use crate::{Error, Result};
@@ -80,6 +80,8 @@ pub struct PathCounters {
     pub submissions: u64,
     /// Loop iterations of long rays and of walks through density grids, and steps of queries of maps: what bounds a submission.
     pub work: u64,
+    /// What stages have fetched, where that is counted ([`PathTracerSettings::count_fetches`]).
+    pub fetches: Fetches,
 }
 
 impl PathCounters {
@@ -96,6 +98,7 @@ impl PathCounters {
         self.medium_collisions += since(|w| w.media.collisions);
         self.null_collisions += since(|w| w.media.null_collisions);
         self.density_lookups += since(|w| w.media.density_lookups);
+        self.fetches += after.fetches.since(before.fetches);
     }
 }
 
@@ -214,6 +217,7 @@ impl PathTracer {
             shadows: needs.waiting,
             ray_quota: settings.ray_quota,
             work: settings.submission_work,
+            count_fetches: settings.count_fetches,
             ..WalkOptions::default()
         };
         let walker = Walker::new(gpu, Arc::clone(&scene), buffers, options)?;

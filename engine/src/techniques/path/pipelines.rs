@@ -85,6 +85,7 @@ impl Pipelines {
             has_light_tree,
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
+            count_fetches: settings.count_fetches,
         });
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.
@@ -106,6 +107,7 @@ impl Pipelines {
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             has_airlight: settings.equiangular && scene.airlight_helps(),
+            count_fetches: settings.count_fetches,
             ..Default::default()
         };
         let medium = shade.has_media.then(|| gpu.compute_pipeline(&medium)).transpose()?;

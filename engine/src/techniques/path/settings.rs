@@ -98,6 +98,8 @@ crate::settings! {
         /// Ends each wave of paths before the next one begins, in place of new paths taking the slots of those that have ended; adaptive samples have whole waves in any case.
         /// Never changes the picture: for measuring, and for techniques that look at a wave as a whole.
         pub whole_waves: bool = false;
+        /// Counts what is fetched ([`PathCounters::fetches`](crate::techniques::path::PathCounters::fetches)), by other kernels. Never changes the picture: for measuring.
+        pub count_fetches: bool = false;
         /// Work, in loop iterations, after which a submission begins no further place, as [`WalkOptions::work`](crate::walk::WalkOptions::work);
         /// 0 chooses by the kind of device. Never changes the picture.
         pub submission_work: u64 = 0;
