@@ -9,6 +9,7 @@
 
 #extension GL_EXT_samplerless_texture_functions : require
 
+#include "scene/fetches.glsl"
 #include "scene/instance.glsl"
 #include "scene/records.glsl"
 
@@ -41,11 +42,18 @@ layout(set = 2, binding = 12) uniform textureBuffer scene_albedo_table;
 layout(set = 2, binding = 13) uniform utextureBuffer scene_light_tree;
 layout(set = 2, binding = 14) uniform utextureBuffer scene_instances;  // by their first triangles, ascending
 
-float distribution_cdf(uint index) { return texelFetch(scene_cdf, int(index)).x; }
+float distribution_cdf(uint index) {
+    count_fetches(1u, 1u);
+    return texelFetch(scene_cdf, int(index)).x;
+}
 vec4 environment_texel(uint index) {
+    count_quarters(1u);
     return uintBitsToFloat(texelFetch(scene_environment, int(ENVIRONMENT_HEADER_QUARTERS + index)));
 }
-float albedo_table(uint index) { return texelFetch(scene_albedo_table, int(index)).x; }
+float albedo_table(uint index) {
+    count_fetches(1u, 1u);
+    return texelFetch(scene_albedo_table, int(index)).x;
+}
 
 uvec4 material_quarter(uint material, uint quarter) { return texelFetch(scene_materials, int(MATERIAL_QUARTERS * material + quarter)); }
 
@@ -55,6 +63,7 @@ uint light_count() { return uint(textureSize(scene_lights)) / LIGHT_QUARTERS; }
 uint environment_cdf_base() { return light_count() + 1u; }
 
 SceneTriangle stored_triangle(uint record) {
+    count_quarters(TRIANGLE_QUARTERS);
     int first = int(TRIANGLE_QUARTERS * record);
     uvec4 q0 = texelFetch(scene_triangles, first);
     uvec4 q1 = texelFetch(scene_triangles, first + 1);
@@ -63,6 +72,7 @@ SceneTriangle stored_triangle(uint record) {
 }
 
 SceneInstance load_instance(uint index) {
+    count_quarters(INSTANCE_QUARTERS);
     int first = int(INSTANCE_QUARTERS * index);
     uvec4 q0 = texelFetch(scene_instances, first);
     uvec4 q1 = texelFetch(scene_instances, first + 1);
@@ -80,6 +90,7 @@ SceneInstance instance_of(uint triangle) {
     uint beyond = uint(textureSize(scene_instances)) / INSTANCE_QUARTERS;
     while (beyond - low > 1u) {
         uint middle = low + beyond >> 1;
+        count_quarters(1u);
         bool behind = texelFetch(scene_instances, int(INSTANCE_QUARTERS * middle)).w > triangle;
         beyond = behind ? middle : beyond;
         low = behind ? low : middle;
@@ -110,6 +121,7 @@ SceneTriangle load_triangle(uint index) { return load_triangle_of(instance_of(in
 
 // Vertices of a triangle, for its attributes.
 uvec3 load_vertices_of(SceneInstance at, uint index) {
+    count_quarters(1u);
     uvec3 v = texelFetch(scene_vertices, int(instance_record(at, index))).xyz;
     return instance_has(at, INSTANCE_MIRRORED) ? v.xzy : v;
 }
@@ -123,6 +135,7 @@ vec3 normalize_or_zero(vec3 v) {
 
 // Normal of a vertex in world space, or zero, which stands for "flat". Cofactors transform normals without dividing by a determinant.
 vec3 load_normal(SceneInstance at, uint vertex) {
+    count_quarters(1u);
     vec3 n = texelFetch(scene_normals, int(vertex)).xyz;
     if (!HAS_INSTANCES || instance_has(at, INSTANCE_IDENTITY)) {
         return n;
@@ -133,6 +146,7 @@ vec3 load_normal(SceneInstance at, uint vertex) {
 
 // Tangent of a vertex in world space, with the sign of the bitangent.
 vec4 load_tangent(SceneInstance at, uint vertex) {
+    count_quarters(1u);
     vec4 t = texelFetch(scene_tangents, int(vertex));
     if (!HAS_INSTANCES || instance_has(at, INSTANCE_IDENTITY)) {
         return t;
@@ -142,7 +156,7 @@ vec4 load_tangent(SceneInstance at, uint vertex) {
 
 SceneMaterial load_material(uint index) {
     vec4 f0 = uintBitsToFloat(material_quarter(index, 0u));
-    vec4 f1 = uintBitsToFloat(material_quarter(index, 1u));
+    uvec4 q1 = material_quarter(index, 1u);
     vec4 f2 = uintBitsToFloat(material_quarter(index, 2u));
     vec4 f3 = uintBitsToFloat(material_quarter(index, 3u));
     vec4 f4 = uintBitsToFloat(material_quarter(index, 4u));
@@ -151,11 +165,13 @@ SceneMaterial load_material(uint index) {
     uvec4 q7 = material_quarter(index, 7u);
     uvec4 q8 = material_quarter(index, 8u);
     uvec4 q9 = material_quarter(index, 9u);
-    return SceneMaterial(f0.xyz, f0.w, f1.xyz, f1.w, f2.xyz, f2.w, f3.xyz, f3.w, f4.xyz, f4.w, f5.xyz, f5.w, f6.xyz, f6.w,
-                         uintBitsToFloat(q7.x), uintBitsToFloat(q7.y), q7.z, q7.w, q8.x, q8.y, q8.z, q8.w, q9.x, q9.y, q9.z, q9.w);
+    return SceneMaterial(f0.xyz, f0.w, uintBitsToFloat(q1.xyz), q1.w, f2.xyz, f2.w, f3.xyz, f3.w, f4.xyz, f4.w, f5.xyz, f5.w, f6.xyz, f6.w,
+                         uintBitsToFloat(q7.x), uintBitsToFloat(q7.y), uintBitsToFloat(q7.z), q7.w, q8.x, q8.y, q8.z, q8.w, q9.x, q9.y, q9.z,
+                         q9.w);
 }
 
 SceneTexture load_texture(uint index) {
+    count_quarters(TEXTURE_QUARTERS);
     int first = int(TEXTURE_QUARTERS * index);
     uvec4 q0 = texelFetch(scene_textures, first);
     uvec4 q1 = texelFetch(scene_textures, first + 1);
@@ -173,6 +189,7 @@ SceneLight load_light(uint index) {
 }
 
 SceneLightNode load_light_node(uint index) {
+    count_quarters(LIGHT_NODE_QUARTERS);
     int first = int(LIGHT_NODE_QUARTERS * index);
     vec4 q0 = uintBitsToFloat(texelFetch(scene_light_tree, first));
     vec4 q1 = uintBitsToFloat(texelFetch(scene_light_tree, first + 1));
@@ -183,12 +200,14 @@ SceneLightNode load_light_node(uint index) {
 
 // The way from the root to a light: a bit a step, the first step last, set where it goes to the second child.
 uint load_light_trail(uint light) {
+    count_quarters(2u);
     uint nodes = texelFetch(scene_light_tree, int(LIGHT_NODE_QUARTERS - 1u)).w;
     uint quarter = LIGHT_NODE_QUARTERS * nodes + light / LIGHT_TRAILS_PER_QUARTER;
     return texelFetch(scene_light_tree, int(quarter))[light % LIGHT_TRAILS_PER_QUARTER];
 }
 
 SceneEnvironment load_environment() {
+    count_quarters(ENVIRONMENT_HEADER_QUARTERS);
     uvec4 q0 = texelFetch(scene_environment, 0);
     uvec4 q1 = texelFetch(scene_environment, 1);
     uvec4 q2 = texelFetch(scene_environment, 2);

@@ -6,6 +6,7 @@
 
 #extension GL_EXT_samplerless_texture_functions : require
 
+#include "scene/fetches.glsl"
 #include "scene/records.glsl"
 
 // descriptor set 3: MediaSet
@@ -36,6 +37,7 @@ SceneMedium load_medium(uint index) {
 vec3 direction_to_cells(SceneMedium m, vec3 d) { return vec3(dot(m.row_x, d), dot(m.row_y, d), dot(m.row_z, d)); }
 
 float fetch_density(SceneMedium m, uvec3 cell) {
+    count_fetches(1u, 1u);
     return texelFetch(media_densities, int(m.first_density + (cell.z * m.cells.y + cell.y) * m.cells.x + cell.x)).x;
 }
 
@@ -56,6 +58,7 @@ float density_in_cells(SceneMedium m, vec3 point) {
 }
 
 float fetch_majorant(SceneMedium m, ivec3 block) {
+    count_fetches(1u, 1u);
     return texelFetch(media_majorants, int(m.first_majorant) + (block.z * int(m.blocks.y) + block.y) * int(m.blocks.x) + block.x).x;
 }
 

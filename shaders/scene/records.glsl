@@ -28,6 +28,7 @@ const uint TEXTURE_QUARTERS = 3u;
 const uint LIGHT_QUARTERS = 4u;
 const uint ENVIRONMENT_HEADER_QUARTERS = 3u;
 const uint MEDIUM_QUARTERS = 9u;
+const uint HOMOGENEOUS_MEDIUM_QUARTERS = 3u;  // of one without a grid
 const uint LIGHT_NODE_QUARTERS = 4u;
 
 const uint LIGHT_NODE_LEAF = 0x80000000u;     // in `child`: what remains is a light
@@ -66,7 +67,7 @@ struct SceneMaterial {
     vec3 base_color;
     float base_alpha;
     vec3 emission;
-    float metallic;
+    uint flags;       // beside the emission: of a lamp's material nothing else is read
     vec3 specular_color;
     float roughness;
     vec3 conductor_a;
@@ -79,7 +80,7 @@ struct SceneMaterial {
     float thickness;
     float alpha_cutoff;
     float normal_scale;
-    uint flags;
+    float metallic;
     uint base_color_texture;
     uint metallic_roughness_texture;
     uint emission_texture;

@@ -37,6 +37,7 @@ vec4 fetch_texel(SceneTexture t, ivec2 p) {
     uvec2 size = uvec2(t.size & 0xFFFFu, t.size >> 16u);
     uint x = wrap_texel(p.x, size.x, (t.flags >> TEXTURE_WRAP_U_SHIFT) & WRAP_MASK);
     uint y = wrap_texel(p.y, size.y, (t.flags >> TEXTURE_WRAP_V_SHIFT) & WRAP_MASK);
+    count_fetches(1u, 1u);
     vec4 c = unpackUnorm4x8(texelFetch(scene_texels, int(t.first_texel + y * size.x + x)).x);
     return (t.flags & TEXTURE_SRGB) != 0u ? vec4(linear_from_srgb(c.rgb), c.a) : c;
 }

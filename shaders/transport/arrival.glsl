@@ -30,6 +30,7 @@ struct ScatteringFrame {
 Arrival arrival_at(Hit hit, vec3 direction, vec3 scene_lower, vec3 scene_upper) {
     Arrival a;
     a.surface = surface_at(hit, scene_lower, scene_upper);
+    count_quarters(surface_material_quarters());
     a.material = load_material(a.surface.material);
     a.bsdf = surface_bsdf(a.material, a.surface);
     a.wo = -direction;
@@ -51,6 +52,7 @@ uint arrival_interior(Arrival a, uint known) { return known == OUTSIDE && a.soli
 // What is left of light after a way inside a body.
 vec3 absorbed(vec3 light, uint interior, float way) {
     if (HAS_ABSORPTION && interior != OUTSIDE) {
+        count_quarters(1u);
         light *= exp(-load_material(interior).absorption * way);
     }
     return light;

@@ -17,10 +17,11 @@ struct Crossing {
 // The way in `direction` to a triangle, believed to be inside `interior`.
 Crossing cross_surface(uint triangle_index, vec3 direction, uint interior) {
     SceneTriangle triangle = load_triangle(triangle_index);
-    uvec4 q7 = material_quarter(triangle.material, 7u);
+    count_quarters(3u);
+    uint flags = material_quarter(triangle.material, 1u).w;
     float transmission = uintBitsToFloat(material_quarter(triangle.material, 3u).w);
     float thickness = uintBitsToFloat(material_quarter(triangle.material, 6u).w);
-    bool boundary = (q7.z & MATERIAL_BOUNDARY) != 0u;
+    bool boundary = (flags & MATERIAL_BOUNDARY) != 0u;
     if (!boundary && !(transmission > 0.0 && thickness > 0.0)) {
         return Crossing(interior, interior, false);
     }
@@ -31,7 +32,11 @@ Crossing cross_surface(uint triangle_index, vec3 direction, uint interior) {
 
 // Index of the medium inside a body, or NO_MEDIUM; `surrounding` is the one outside all.
 uint medium_inside(uint interior, uint surrounding) {
-    return interior == OUTSIDE ? surrounding : material_quarter(interior, 9u).z - 1u;
+    if (interior == OUTSIDE) {
+        return surrounding;
+    }
+    count_quarters(1u);
+    return material_quarter(interior, 9u).z - 1u;
 }
 
 #endif

@@ -79,11 +79,17 @@ LightSample no_light() {
     return none;
 }
 
+// Of lights without a place of their own the first quarter is enough.
+SceneLight load_chosen_light(uint index) {
+    count_quarters(HAS_PUNCTUAL_LIGHTS ? LIGHT_QUARTERS : 1u);
+    return load_light(index);
+}
+
 // A light by its power, whatever it lights, by the first of two words, which becomes the place within that light's share.
 LightChoice choose_light_by_power(inout uvec2 word, uint fresh) {
     LightChoice choice;
     choice.index = distribution_sample(0u, light_count(), word.x, fresh, choice.probability);
-    choice.light = load_light(choice.index);
+    choice.light = load_chosen_light(choice.index);
     return choice;
 }
 
@@ -92,7 +98,7 @@ LightChoice choose_light(LightReceiver r, inout uvec2 word, uint fresh) {
     if (HAS_LIGHT_TREE) {
         LightChoice choice;
         choice.index = light_tree_sample(r.position, r.normal, word.x, fresh, choice.probability);
-        choice.light = load_light(choice.index);
+        choice.light = load_chosen_light(choice.index);
         return choice;
     }
     return choose_light_by_power(word, fresh);
@@ -133,6 +139,7 @@ LightSample light_seen(LightPoint p, vec3 from) {
     result.direction = to * inversesqrt(squared);
     if (HAS_AREA_LIGHTS && light.kind == LIGHT_TRIANGLE) {
         result.pdf = area_to_solid_angle(2.0 * p.choice.probability / p.surface.double_area, squared, abs(dot(p.normal, result.direction)));
+        count_quarters(light_material_quarters());
         SceneMaterial m = load_material(p.surface.material);
         if (result.pdf > 0.0) {
             result.radiance = surface_emission(m, p.surface, -result.direction) / result.pdf;

@@ -63,6 +63,7 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     }
     s.uvs = vec4(0.0);
     if (HAS_TEXTURES) {
+        count_quarters(3u);
         s.uvs = interpolate_attribute(scene_uvs, v, w);
     }
     s.tangent = vec4(0.0);
@@ -71,6 +72,7 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     }
     s.color = vec4(1.0);
     if (HAS_VERTEX_COLORS) {
+        count_quarters(3u);
         s.color = interpolate_attribute(scene_colors, v, w);
     }
     s.material = triangle.material;
@@ -78,6 +80,19 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
     s.around = triangle.around - 1u;
     return s;
 }
+
+// Quarters of a material that a scene's surfaces read: base colour; emission and flags; the layer and the metal, with their index and what transmits; the way inside;
+// how metallic; textures.
+uint surface_material_quarters() {
+    bool conductor = HAS_CONDUCTOR || HAS_SCHLICK_CONDUCTOR || HAS_COMPENSATED_CONDUCTOR || HAS_TINTED_CONDUCTOR || HAS_SIMPLIFIED_CONDUCTOR;
+    bool flags = HAS_AREA_LIGHTS || HAS_UNLIT || HAS_METAL || conductor || HAS_PHONG;
+    bool layer = HAS_METAL || HAS_SPECULAR_LAYER || HAS_TRANSMISSION;
+    bool inside = HAS_TRANSMISSION || HAS_ABSORPTION;
+    return 1u + uint(flags) + (layer ? 4u : 0u) + uint(inside) + uint(HAS_METAL || HAS_TEXTURES || HAS_NORMAL_MAPS) + (HAS_TEXTURES ? 2u : 0u);
+}
+
+// And of that of a lamp.
+uint light_material_quarters() { return 1u + (HAS_TEXTURES ? 1u : 0u) + (HAS_ALPHA ? 2u : 0u); }
 
 vec4 surface_base_color(SceneMaterial m, Surface s) { return material_base_color(m, s.uvs, s.color); }
 

@@ -7,6 +7,7 @@
 #define CLERESTORY_WALK_CANDIDATES_GLSL
 
 #define CLERESTORY_SAMPLER SAMPLER_PCG
+#include "walk/count_fetches.glsl"
 #include "walk/wave.glsl"
 
 // What a scene has, by the ids of transport/features.glsl.
@@ -30,6 +31,9 @@ layout(push_constant, scalar) uniform Push {
 #include "scene/material.glsl"
 #include "walk/draws.glsl"
 
+// Quarters of a material that say where there is a surface: base colour, flags, cutoff and texture.
+const uint COVERAGE_QUARTERS = 3u;
+
 const uint CANDIDATES_EXTEND = 0u;
 const uint CANDIDATES_SHADOW = 1u;
 
@@ -38,12 +42,14 @@ uvec4 candidate_key;
 
 void begin_candidates(uint slot, uint bounce, uint kind) {
     if (HAS_ALPHA) {
+        count_quarters(NUMBERED ? 1u : 0u);
         candidate_key = uvec4(walk_sequence(slot), walk_index(slot), bounce * 2u + kind, push.key.seed);
     }
 }
 
 bool accept_candidate(uint triangle, vec2 barycentrics) {
     SceneInstance at = instance_of(triangle);
+    count_quarters(COVERAGE_QUARTERS);
     SceneMaterial m = load_material(load_triangle_of(at, triangle).material);
     if ((m.flags & (MATERIAL_MASK | MATERIAL_BLEND)) == 0u) {
         return true;
@@ -54,9 +60,11 @@ bool accept_candidate(uint triangle, vec2 barycentrics) {
     if (HAS_TEXTURES || HAS_VERTEX_COLORS) {
         uvec3 v = load_vertices_of(at, triangle);
         if (HAS_TEXTURES) {
+            count_quarters(3u);
             uvs = interpolate_attribute(scene_uvs, v, w);
         }
         if (HAS_VERTEX_COLORS) {
+            count_quarters(3u);
             color = interpolate_attribute(scene_colors, v, w);
         }
     }

@@ -4,8 +4,13 @@
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 64) in;
+layout(constant_id = 0) const bool REFILLED = false;  // slots take new walks as walks end
 
 #include "walk/compact.glsl"
+#include "walk/turnover.glsl"
+
+// By slot SLOT_*, of a wave that is kept full; elsewhere some other buffer is bound, and nothing is written.
+layout(set = 1, binding = 0, scalar) restrict writeonly buffer WalkTurnover { uint walk_turnover[]; };
 
 void main() {
     uint chunk = gl_GlobalInvocationID.x;
@@ -20,7 +25,16 @@ void main() {
         uvec4 flags = load_flags(texel, status.previous_count);
         for (uint i = 0u; i < FLAGS_PER_TEXEL; ++i) {
             uint place = FLAGS_PER_TEXEL * texel + i;
-            if ((flags[i] & FLAG_ALIVE) != 0u) {
+            bool alive = (flags[i] & FLAG_ALIVE) != 0u;
+            if (REFILLED && place < status.previous_count) {
+                uint slot = texelFetch(walk_queue_in, int(place)).x;
+                if (!alive) {
+                    walk_turnover[slot] = SLOT_ENDED;
+                } else if (target.x == 0u) {
+                    status.oldest = texelFetch(walk_numbers_in, int(slot)).w;
+                }
+            }
+            if (alive) {
                 walk_queue_out[target.x++] = first_bounce ? place : texelFetch(walk_queue_in, int(place)).x;
             }
             if ((flags[i] & FLAG_WAITING) != 0u) {

@@ -25,6 +25,14 @@ uint walk_index(uint slot) {
     return push.key.first_index + slot % push.key.indices;
 }
 
+// Bounces that the walk has finished.
+uint walk_round(uint slot) {
+    if (CLERESTORY_NUMBERED) {
+        return status.rounds - texelFetch(walk_numbers_in, int(slot)).z;
+    }
+    return status.rounds;
+}
+
 Sampler walk_sampler(uint slot, uint dimension) { return Sampler(walk_sequence(slot), walk_index(slot), dimension, push.key.seed); }
 
 // Two words of a bounce.

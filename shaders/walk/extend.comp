@@ -23,6 +23,8 @@ void main() {
     }
     bool begun = has_work_left();
     uint slot = load_slot(place);
+    // What it carries is not read here.
+    count_quarters(WALK_STATE_QUARTERS - 1u);
     WalkState walk = load_walk(slot);
     begin_candidates(slot, walk.bounce, CANDIDATES_EXTEND);
     Hit hit = no_hit(FAR_AWAY);
@@ -41,6 +43,7 @@ void main() {
     walk_hits_out[place] = hit;
     walk_resume[place] = resume;
     count_work(index_iterations, WORK_LEAST);
+    add_fetches(FETCHES_EXTEND);
     if (resume != INDEX_FINISHED) {
         stall_place(STALLED_EXTEND, begun);
     }

@@ -14,6 +14,7 @@ layout(local_size_x = 64) in;
 
 // Whether light passes, and nothing else.
 void trace_shadow_ray(uint place, uint resume, bool begun) {
+    count_fetches(1u, 1u);
     ShadowRay s = load_shadow_ray(texelFetch(walk_waiting_queue_in, int(place)).x);
     begin_candidates(s.slot, s.bounce, CANDIDATES_SHADOW);
     Hit hit = no_hit(s.t_max);
@@ -45,4 +46,5 @@ void main() {
         trace_shadow_ray(place, resume, begun);
     }
     count_work(index_iterations + GRID_ITERATION_WORK * grid_iterations, WORK_LEAST);
+    add_fetches(FETCHES_SHADOW);
 }

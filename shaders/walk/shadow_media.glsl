@@ -51,6 +51,7 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
     float scale = length(s.direction);
     uint medium = medium_inside(crossing.interior, push.surrounding);
     if (medium != NO_MEDIUM && state.transmittance != vec3(0.0)) {
+        count_quarters(medium_quarters());
         SceneMedium m = load_medium(medium);
         if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
             state.transmittance *= transmittance(m.sigma_t, max(state.hit.t - state.start, 0.0) * scale);
@@ -58,7 +59,8 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
             GridWalk walk = begin_grid_walk(m, s.origin, s.direction, state.start, state.hit.t);
             walk.draw = state.grid_walks << GRID_WALK_SHIFT;
             ++state.grid_walks;
-            uvec4 key = uvec4(walk_sequence(s.slot), walk_index(s.slot), SHADOW_KEY + status.rounds, push.key.seed);
+            count_quarters(NUMBERED ? 1u : 0u);
+            uvec4 key = uvec4(walk_sequence(s.slot), walk_index(s.slot), SHADOW_KEY + walk_round(s.slot), push.key.seed);
             outcome = ratio_tracking(m, key, scale, walk, iterations, state.transmittance);
             COUNT_MEDIUM(density_lookups, walk.nulls)
             float reached = resumed_start(state.start, walk.entry + walk.t);
@@ -69,6 +71,7 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
     }
     // A solid that absorbs has no medium inside, whose walk could stop: this is the whole way through it.
     if (HAS_ABSORPTION && crossing.interior != OUTSIDE && outcome == GRID_LEFT && state.transmittance != vec3(0.0)) {
+        count_quarters(1u);
         state.transmittance *= transmittance(load_material(crossing.interior).absorption, max(state.hit.t - state.start, 0.0) * scale);
     }
     bool ended = outcome == GRID_LEFT && (!met || state.transmittance == vec3(0.0));
@@ -85,6 +88,8 @@ bool pass_surface(ShadowRay s, inout ShadowState state, inout uint iterations, o
 // Of a place that is left for later only the state is stored that it begins with.
 void trace_shadow_rays_through_media(uint queue_place, uint from, bool begun) {
     uint resume = RESUMES ? from : INDEX_START;
+    // The place, and the flags of four places.
+    count_fetches(2u, 1u + FLAGS_PER_TEXEL);
     uint place = texelFetch(walk_waiting_queue_in, int(queue_place)).x;
     uint rays = texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & (FLAG_AIRLIGHT | FLAG_SAMPLED);
     if (RESUMES) {

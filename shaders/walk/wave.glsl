@@ -14,6 +14,7 @@
 #define CLERESTORY_WALK_WAVE_GLSL
 
 #include "accel/ray.glsl"
+#include "scene/fetches.glsl"
 
 // descriptor set 0: WaveSet
 
@@ -47,6 +48,12 @@ const uint WAITING_QUARTERS = 3u;
 const uint FLAGS_PER_TEXEL = 4u;
 // Places of the queue that one invocation of the compaction kernels handles.
 const uint COMPACT_CHUNK = 32u;
+// Stages whose fetches are counted.
+const uint FETCHES_EXTEND = 0u;
+const uint FETCHES_MEDIUM = 1u;
+const uint FETCHES_SHADE = 2u;
+const uint FETCHES_SHADOW = 3u;
+const uint FETCH_STAGES = 4u;
 // Invocations of a workgroup of every stage.
 const uint WALK_GROUP = 64u;
 
@@ -61,11 +68,11 @@ struct WalkKey {
 
 struct WalkState {
     vec3 origin;      // of the ray under way
-    float pdf;        // of its direction, solid angle; 0 after a delta lobe or at the start: emission then counts in full
+    float eta_scale;  // undoes the radiance scaling of refractions for Russian roulette
     vec3 direction;   // unit
     uint bounce;      // scattering events so far
     vec3 throughput;
-    float eta_scale;  // undoes the radiance scaling of refractions for Russian roulette
+    float pdf;        // of the direction, solid angle; 0 after a delta lobe or at the start: emission then counts in full
 };
 
 struct GatheredLight {
@@ -126,6 +133,10 @@ layout(set = 0, binding = 0, scalar) restrict buffer WaveStatusBlock {
     uint waited[2];          // places that have waited
     uint unstarted;          // 1 where places were left for later, since the submission's work was used up
     coherent int work_left;  // of this submission, in units of WORK_UNIT iterations; the places under way may take it below 0
+    uint oldest;             // of a wave that is kept full: what its owner has numbered the walk by that is first in the queue
+    // 64-bit counters by stage, low word first, where kernels count what they fetch: texels, and words of them.
+    uint fetched_texels[2u * FETCH_STAGES];
+    uint fetched_words[2u * FETCH_STAGES];
 } status;
 layout(set = 0, binding = 1) uniform utextureBuffer walk_queue_in;
 layout(set = 0, binding = 2, scalar) restrict writeonly buffer WalkQueueOut { uint walk_queue_out[]; };
@@ -159,7 +170,8 @@ layout(set = 0, binding = 21, scalar) restrict buffer WalkMediumCounters {
     uint second_rays[2];  // of places that have one already
 } medium_counters;
 
-// Sequence and place in it of the walk in each slot, where walks have numbers of their own instead of those of a WalkKey; elsewhere some other buffer is bound.
+// Sequence and place in it of the walk in each slot, where walks have numbers of their own instead of those of a WalkKey; elsewhere some other buffer is bound. Of a
+// wave that is kept full also the round that the walk began in, and a number of its owner's; 0 stands for the round elsewhere.
 layout(set = 0, binding = 22) uniform utextureBuffer walk_numbers_in;
 
 #define COUNT_MEDIUM(COUNTER, AMOUNT) { \
@@ -167,6 +179,21 @@ layout(set = 0, binding = 22) uniform utextureBuffer walk_numbers_in;
     if (counted_amount > 0u && atomicAdd(medium_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
         atomicAdd(medium_counters.COUNTER[1], 1u); \
     } \
+}
+
+#define ADD_WIDE(COUNTER, STAGE, AMOUNT) { \
+    uint added = AMOUNT; \
+    if (added > 0u && atomicAdd(COUNTER[2u * STAGE], added) > 0xFFFFFFFFu - added) { \
+        atomicAdd(COUNTER[2u * STAGE + 1u], 1u); \
+    } \
+}
+
+// Adds what an invocation has fetched to the counters of its stage.
+void add_fetches(uint stage) {
+    if (CLERESTORY_COUNT_FETCHES) {
+        ADD_WIDE(status.fetched_texels, stage, fetched_texels)
+        ADD_WIDE(status.fetched_words, stage, fetched_words)
+    }
 }
 
 // Whether a place may be begun. What one place takes is bounded by its quota, so that a submission ends soon after its work is used up, whatever the scene.
@@ -198,6 +225,7 @@ void stall_place(uint stage, bool begun) {
     atomicMax(status.stalled, stage);
 }
 
+// Where nothing refracts, what a surface scatters needs the last two quarters alone.
 WalkState load_walk(uint slot) {
     int first = int(WALK_STATE_QUARTERS * slot);
     vec4 q0 = uintBitsToFloat(texelFetch(walk_states_in, first));
@@ -207,11 +235,13 @@ WalkState load_walk(uint slot) {
 }
 
 Hit load_hit(uint place) {
+    count_quarters(1u);
     uvec4 q = texelFetch(walk_hits_in, int(place));
     return Hit(uintBitsToFloat(q.x), uintBitsToFloat(q.yz), q.w);
 }
 
 ShadowRay load_shadow_ray(uint place) {
+    count_quarters(WAITING_QUARTERS);
     int first = int(WAITING_QUARTERS * place);
     vec4 q0 = uintBitsToFloat(texelFetch(walk_waiting_in, first));
     uvec4 q1 = texelFetch(walk_waiting_in, first + 1);
@@ -228,6 +258,12 @@ void store_waiting(uint place, uvec4 q0, uvec4 q1, uvec4 q2) {
 }
 
 // The slot at a place: in the first bounce, the place.
-uint load_slot(uint place) { return status.rounds == 0u ? place : texelFetch(walk_queue_in, int(place)).x; }
+uint load_slot(uint place) {
+    if (status.rounds == 0u) {
+        return place;
+    }
+    count_fetches(1u, 1u);
+    return texelFetch(walk_queue_in, int(place)).x;
+}
 
 #endif

@@ -25,6 +25,6 @@ void main() {
         return;
     }
     vec3 origin = push.first + float(walk_sequence(slot)) * push.along;
-    walk_states_out[slot] = WalkState(origin, 0.0, push.direction, 0u, vec3(1.0), 1.0);
+    walk_states_out[slot] = WalkState(origin, 1.0, push.direction, 0u, vec3(1.0), 0.0);
     walk_gathered[slot] = GatheredLight(vec3(0.0), OUTSIDE);
 }

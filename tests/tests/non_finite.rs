@@ -67,6 +67,9 @@ fn they_are_counted_by_kind_and_left_out() {
             first_film_pixel: 0,
             pixel_count: 2,
             sample_count: SAMPLES,
+            first_sample: 0,
+            slot_count: 2 * SAMPLES,
+            first_slot: 0,
         };
         let groups = [1, 1, 1];
         let expect = |film: &GpuFilm, record: &dyn Fn(&mut Pass<'_>) -> clerestory::Result<()>| {

@@ -2,9 +2,15 @@
 
 use super::stall::StallWatch;
 use super::wave::{MediumCounts, Status};
-use crate::gpu::Timings;
-use crate::gpu::shaders::constants::{STALLED_ARRIVAL, STALLED_EXTEND, STALLED_SCATTER, STALLED_SHADOW};
+use crate::gpu::shaders::constants::{
+    FETCH_STAGES, FETCHES_EXTEND, FETCHES_MEDIUM, FETCHES_SHADE, FETCHES_SHADOW, STALLED_ARRIVAL, STALLED_EXTEND,
+    STALLED_SCATTER, STALLED_SHADOW,
+};
 use crate::gpu::shaders::types::WalkKey;
+use crate::gpu::{Timings, wide_counter};
+
+/// Bytes of a word.
+const WORD_BYTES: u64 = 4;
 
 /// What a wave took.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -25,6 +31,55 @@ pub struct Walked {
     pub work: u64,
     /// What happened in media.
     pub media: MediumCounts,
+    /// What its stages have fetched, where they count it.
+    pub fetches: Fetches,
+}
+
+/// Texels that the stages of a wave have fetched of records and of what they hand on, without those of the ray index: exact counts of what their specialized kernels
+/// need, by [`Fetches::STAGES`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct Fetches {
+    /// Texels.
+    pub texels: [u64; FETCH_STAGES as usize],
+    /// Bytes of them.
+    pub bytes: [u64; FETCH_STAGES as usize],
+}
+
+impl Fetches {
+    /// The stages: closest hits, the way through media, scattering, shadow rays.
+    pub const STAGES: [&'static str; FETCH_STAGES as usize] = ["extend", "medium", "shade", "shadow"];
+
+    pub(super) fn of(status: &Status) -> Self {
+        let stages = [FETCHES_EXTEND, FETCHES_MEDIUM, FETCHES_SHADE, FETCHES_SHADOW];
+        let count = |words: &[u32; 2 * FETCH_STAGES as usize], stage: u32| {
+            let low = 2 * stage as usize;
+            wide_counter([words[low], words[low + 1]])
+        };
+        Self {
+            texels: stages.map(|stage| count(&status.fetched_texels, stage)),
+            bytes: stages.map(|stage| WORD_BYTES * count(&status.fetched_words, stage)),
+        }
+    }
+
+    /// What has come to it since `before`.
+    pub fn since(self, before: Self) -> Self {
+        let less = |after: [u64; FETCH_STAGES as usize], before: [u64; FETCH_STAGES as usize]| {
+            std::array::from_fn(|stage| after[stage] - before[stage])
+        };
+        Self {
+            texels: less(self.texels, before.texels),
+            bytes: less(self.bytes, before.bytes),
+        }
+    }
+}
+
+impl std::ops::AddAssign for Fetches {
+    fn add_assign(&mut self, more: Self) {
+        for stage in 0..Self::STAGES.len() {
+            self.texels[stage] += more.texels[stage];
+            self.bytes[stage] += more.bytes[stage];
+        }
+    }
 }
 
 /// A wave of walks under way: what [`Walker::begin`](super::Walker::begin) makes and [`Walker::advance`](super::Walker::advance) takes on.
@@ -34,6 +89,8 @@ pub struct WaveInFlight {
     pub(super) key: WalkKey,
     pub(super) status: Status,
     pub(super) next: Next,
+    /// Walks that the next submission begins behind those that are alive, of a wave that is kept full.
+    pub(super) begins: u32,
     /// Some rays of the stage that goes on were stopped by a quota, rather than left for later before they began.
     pub(super) resumes: bool,
     /// Places of the bounce at which an arrival stage was stopped by its quota.
@@ -89,6 +146,21 @@ impl WaveInFlight {
     /// Whether all walks have ended and nothing waits.
     pub fn has_ended(&self) -> bool {
         self.next == Next::End
+    }
+
+    /// Whether it lies between two bounces, all of what came before being done.
+    pub fn is_between_bounces(&self) -> bool {
+        matches!(self.next, Next::Bounce | Next::End)
+    }
+
+    /// Walks that are alive.
+    pub fn walks(&self) -> u32 {
+        self.status.active_count
+    }
+
+    /// Of a wave that is kept full and has walks: the number that its owner has given the walk that began first of them, and before the last refill.
+    pub fn oldest(&self) -> u32 {
+        self.status.oldest
     }
 
     /// After a submission that began with `from`: what the next one begins with.

@@ -2,6 +2,7 @@
 //!
 //! One kernel a stage, specialized to the scene: what it lacks is not compiled in, and the bindings of what it lacks hold other buffers.
 
+use super::walker::WalkOptions;
 use super::wave::{WaveBuffers, stage_barrier};
 use crate::Result;
 use crate::gpu::shaders::constants::{NO_MEDIUM, WORK_UNIT};
@@ -54,9 +55,10 @@ impl TracePipelines {
         scene: &GpuScene,
         buffers: &WaveBuffers,
         index_quota: u32,
-        shadows: bool,
+        options: &WalkOptions,
         resumes: bool,
     ) -> Result<Self> {
+        let (shadows, count_fetches) = (options.shadows, options.count_fetches);
         let numbered = buffers.is_numbered();
         let work_least = work_least(gpu.caps().kind);
         let (profile, traversal) = (scene.profile(), scene.index_traversal());
@@ -76,6 +78,7 @@ impl TracePipelines {
             resumes,
             work_least,
             numbered,
+            count_fetches,
             ..Default::default()
         };
         let shadow = shadow::Spec {
@@ -93,6 +96,7 @@ impl TracePipelines {
             resumes,
             work_least,
             numbered,
+            count_fetches,
             ..Default::default()
         };
         Ok(Self {

@@ -8,17 +8,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use super::arrival::{ArrivalStage, Places, StoppedPlaces};
+use super::arrival::{Places, StoppedPlaces};
 use super::compaction::Compaction;
-use super::in_flight::{Next, Walked, WaveInFlight};
+use super::in_flight::{Fetches, Next, Walked, WaveInFlight};
+use super::stages::{Refill, WalkStages};
 use super::stall::StallWatch;
 use super::trace::{RAY_QUOTA, TracePipelines, ray_quota};
+use super::turnover::Turnover;
 use super::wave::{Status, WaveBuffers, group_counts, indirect};
 use crate::Result;
 use crate::gpu::shaders::constants::{STALLED_NOT, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
-use crate::gpu::{Access, DeviceKind, Gpu, Pace, Pass, PipelineInfo, Recorder, wide_counter};
+use crate::gpu::{Access, DeviceKind, Gpu, Pace, PipelineInfo, Recorder, wide_counter};
 use crate::transport::GpuScene;
 
 /// Work of a submission where nothing else is asked for, in loop iterations that count: some tenths of a second on two cores, and less on others.
@@ -28,6 +30,12 @@ const DEVICE_WORK: u64 = 1 << 30;
 const WORK_UNITS_MAX: u64 = 1 << 30;
 /// Rays of the bounces of a submission on software devices, about, unless one bounce has more.
 const SOFTWARE_RAYS: u32 = 1 << 19;
+
+/// Bounces of a submission that has begun walks in a wave that is kept full: more would leave slots empty for long.
+const REFILLED_BOUNCES: u32 = 2;
+/// Bounces that a wave that is kept full counts before its first: an even number, so that queues have the roles of a first bounce, and more than one, so that slots are
+/// read from the queue.
+const REFILLED_ROUNDS: u32 = 2;
 
 /// The number of a walker's wave before the first one.
 const NO_WAVE: u64 = 0;
@@ -49,6 +57,8 @@ pub struct WalkOptions {
     /// Work, in loop iterations, after which a submission begins no further place: those of long rays, four times those of walks through grids of densities, and twice
     /// those of queries of maps. The places under way end as their quotas say. 0 chooses by the kind of device.
     pub work: u64,
+    /// Counts what the stages that trace rays fetch beside the index ([`Walked::fetches`]), by other kernels.
+    pub count_fetches: bool,
 }
 
 impl Default for WalkOptions {
@@ -59,64 +69,8 @@ impl Default for WalkOptions {
             ray_quota: RAY_QUOTA,
             bounces: 12,
             work: 0,
+            count_fetches: false,
         }
-    }
-}
-
-/// What the owner of walks does with them, stage by stage. Kernels hand on shadow rays and walks by `walk/hand_on.glsl`, which does what scenes with media
-/// take besides. The walker records the closest hits before [`record_scatter`](WalkStages::record_scatter)
-/// and the compaction of the queues behind it; every method leaves [`stage_barrier`](super::stage_barrier) behind what it records.
-pub trait WalkStages {
-    /// Records what goes first in a submission, whatever its wave is.
-    ///
-    /// # Errors
-    /// Those of recording.
-    fn record_before(&mut self, _recorder: &mut Recorder, _buffers: &WaveBuffers) -> Result<()> {
-        Ok(())
-    }
-
-    /// A submission that began so is the device's now, whatever becomes of the wait for it.
-    fn submitted(&mut self) {}
-
-    /// Sets what the owner counts to zero, in the first pass of a wave.
-    ///
-    /// # Errors
-    /// Those of recording.
-    fn reset(&self, _pass: &mut Pass<'_>) -> Result<()> {
-        Ok(())
-    }
-
-    /// Records where walks start: `walk_states_out` and `walk_gathered` of each slot.
-    ///
-    /// # Errors
-    /// Those of recording.
-    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()>;
-
-    /// What is gathered between arrival and scattering.
-    fn arrival(&self) -> Option<&dyn ArrivalStage> {
-        None
-    }
-
-    /// Records what happens where rays have arrived: by place `walk_flags_out`, and `walk_states_out` of walks that go on.
-    ///
-    /// # Errors
-    /// Those of recording.
-    fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()>;
-
-    /// Records what is done with what waits, by the queue of its places; [`Bounce::record_shadow`] for shadow rays.
-    ///
-    /// # Errors
-    /// Those of recording.
-    fn record_waiting(&self, _recorder: &mut Recorder, _bounce: &Bounce<'_>) -> Result<()> {
-        Ok(())
-    }
-
-    /// Copies what the owner counts to where the host reads it, at the end of a submission.
-    ///
-    /// # Errors
-    /// Those of recording.
-    fn read_back(&self, _pass: &mut Pass<'_>) -> Result<()> {
-        Ok(())
     }
 }
 
@@ -185,9 +139,9 @@ impl Walker {
             (wanted, _) => wanted,
         };
         Ok(Self {
-            trace: TracePipelines::new(gpu, &scene, &buffers, quota, options.shadows, false)?,
+            trace: TracePipelines::new(gpu, &scene, &buffers, quota, &options, false)?,
             resume: None,
-            compaction: Compaction::new(gpu)?,
+            compaction: Compaction::new(gpu, buffers.turnover().is_some())?,
             pace: Pace::new(gpu.caps().kind, bounces),
             gpu: gpu.clone(),
             scene,
@@ -212,7 +166,8 @@ impl Walker {
 
     /// The kernels of the compaction.
     pub fn compaction_pipelines(&self) -> Vec<PipelineInfo> {
-        self.compaction.info().into()
+        let turnover = self.buffers.turnover().map(Turnover::pipeline);
+        self.compaction.info().into_iter().chain(turnover).collect()
     }
 
     /// Follows `walks` walks, at most as many as there are slots, until all have ended and nothing waits, however many submissions that takes.
@@ -236,21 +191,63 @@ impl Walker {
             let cause = format!("is more than the wave's {} slots", self.buffers.slots());
             return Err(crate::Error::setting("walks", walks, cause));
         }
+        let status = Status {
+            active_count: walks,
+            ..Status::default()
+        };
+        Ok(self.begin_with(key, status, Next::Start))
+    }
+
+    /// A wave that is kept full, without walks yet: [`Walker::refill`] gives it some. Of `key` the seed alone counts. What was under way is given up.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for memory without a [`Turnover`] and numbers, [`Error::DeviceLost`](crate::Error::DeviceLost),
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn begin_full(&mut self, key: WalkKey) -> Result<WaveInFlight> {
+        let Some(turnover) = self.buffers.turnover().filter(|_| self.buffers.is_numbered()) else {
+            let cause = "is not enough: a wave that is kept full has a turnover, and numbers of its walks";
+            return Err(crate::Error::setting("buffers", "without", cause));
+        };
+        turnover.free_all()?;
+        let status = Status {
+            rounds: REFILLED_ROUNDS,
+            ..Status::default()
+        };
+        Ok(self.begin_with(key, status, Next::End))
+    }
+
+    fn begin_with(&mut self, key: WalkKey, status: Status, next: Next) -> WaveInFlight {
         self.pace.begin();
         self.wave = NEXT_WAVE.fetch_add(1, Ordering::Relaxed);
-        Ok(WaveInFlight {
+        WaveInFlight {
             number: self.wave,
             key,
-            status: Status {
-                active_count: walks,
-                ..Status::default()
-            },
-            next: Next::Start,
+            status,
+            next,
+            begins: 0,
             resumes: false,
             stopped: 0,
             watch: StallWatch::new(self.quota),
             walked: Walked::default(),
-        })
+        }
+    }
+
+    /// Lets the next submission of a wave that is kept full begin so many walks more. A submission that fails has lost them, and the wave with them.
+    ///
+    /// # Errors
+    /// [`Error::Setting`](crate::Error::Setting) for more walks than slots are free, and within a bounce ([`WaveInFlight::is_between_bounces`]).
+    pub fn refill(&self, wave: &mut WaveInFlight, walks: u32) -> Result<()> {
+        let free = self.buffers.slots() - wave.status.active_count;
+        if walks > free || !wave.is_between_bounces() || self.buffers.turnover().is_none() {
+            let cause = format!("is not to be had: {free} slots of the wave are free, between two bounces");
+            return Err(crate::Error::setting("walks", walks, cause));
+        }
+        if walks > 0 {
+            wave.begins += walks;
+            wave.status.active_count += walks;
+            wave.next = Next::Bounce;
+        }
+        Ok(())
     }
 
     /// One submission towards the end of a wave, the last one that was begun: a bounded piece of work, whatever the scene. The stages are those of the whole wave.
@@ -277,6 +274,7 @@ impl Walker {
             _ => {
                 let rounds = wave.status.rounds;
                 self.submit(wave, stages)?;
+                wave.begins = 0;
                 let (stops, postpones) = (wave.status.unfinished > 0, wave.status.unstarted > 0);
                 wave.walked.stalls += u64::from(stops);
                 wave.walked.postponed += u64::from(postpones);
@@ -334,13 +332,12 @@ impl Walker {
     fn submit(&mut self, wave: &mut WaveInFlight, stages: &mut dyn WalkStages) -> Result<()> {
         let resumes = wave.resumes && matches!(wave.next, Next::Hits | Next::Shadows);
         if resumes && self.resume.is_none() {
-            let shadows = self.options.shadows;
             self.resume = Some(TracePipelines::new(
                 &self.gpu,
                 &self.scene,
                 &self.buffers,
                 self.quota,
-                shadows,
+                &self.options,
                 true,
             )?);
         }
@@ -363,6 +360,7 @@ impl Walker {
         walked.timings.push(timings);
         walked.rays = wide_counter(wave.status.rays);
         walked.waited = wide_counter(wave.status.waited);
+        walked.fetches = Fetches::of(&wave.status);
         let units = i64::from(self.work_units) - i64::from(wave.status.work_left);
         walked.work += units.unsigned_abs() * u64::from(WORK_UNIT);
         if let Some(media) = &self.buffers.media {
@@ -374,7 +372,7 @@ impl Walker {
 
     /// Records the status that a submission begins with, and where walks start.
     fn record_begin(&self, recorder: &mut Recorder, wave: &WaveInFlight, stages: &dyn WalkStages) -> Result<()> {
-        let starts = wave.next == Next::Start;
+        let (starts, is_first) = (wave.next == Next::Start, wave.walked.submissions == 0);
         let mut status = wave.status;
         // A stalled round leaves no groups to dispatch.
         let groups = group_counts(status.active_count);
@@ -384,7 +382,7 @@ impl Walker {
         status.work_left = self.work_units as i32;
         recorder.pass(&self.pass("begin"), |pass| {
             pass.update(self.buffers.status.view(), &[status])?;
-            if starts {
+            if is_first {
                 if let Some(media) = &self.buffers.media {
                     media.reset(pass)?;
                 }
@@ -400,6 +398,15 @@ impl Walker {
         if starts {
             // Its output is the input of the first bounce, whose parity is 0.
             stages.record_start(recorder, &self.buffers.set(1))?;
+        }
+        if wave.begins > 0 {
+            let refill = Refill {
+                place: wave.status.active_count - wave.begins,
+                count: wave.begins,
+                round: wave.status.rounds,
+            };
+            let set = self.buffers.set(1 - wave.status.rounds as usize % 2);
+            stages.record_refill(recorder, &self.buffers, &set, refill)?;
         }
         Ok(())
     }
@@ -423,7 +430,12 @@ impl Walker {
         let bounces = if arrival_alone {
             1
         } else {
-            self.bounces_of(wave.status.active_count)
+            let bounces = self.bounces_of(wave.status.active_count);
+            if wave.begins > 0 {
+                bounces.min(REFILLED_BOUNCES)
+            } else {
+                bounces
+            }
         };
         for index in 0..bounces {
             let bounce = self.bounce(key, (rounds + index) as usize % 2);

@@ -1,5 +1,6 @@
 //! Working memory of a wave: queues, and what stages hand to each other. GLSL: `walk/wave.glsl`, which says how it is laid out.
 
+use super::turnover::Turnover;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{COMPACT_CHUNK, WAITING_QUARTERS, WALK_GROUP};
 use crate::gpu::shaders::sets::WaveSet;
@@ -85,6 +86,8 @@ pub struct WaveBuffers {
     pub(super) media: Option<MediaBuffers>,
     /// Of walks that have some.
     numbers: Option<TexelView>,
+    /// Of a wave that is kept full.
+    turnover: Option<Turnover>,
     needs: WaveNeeds,
     slots: u32,
 }
@@ -196,6 +199,7 @@ impl WaveBuffers {
             ))?,
             media: needs.media.then(|| MediaBuffers::new(gpu, slots, needs)).transpose()?,
             numbers: None,
+            turnover: None,
             needs,
             slots,
         })
@@ -216,6 +220,26 @@ impl WaveBuffers {
     /// a walker is made of the memory.
     pub fn number_by(&mut self, numbers: TexelView) {
         self.numbers = Some(numbers);
+    }
+
+    /// Lets the wave be kept full. Its walks have numbers of their own ([`number_by`](WaveBuffers::number_by)) of four words (`R32G32B32A32_UINT`), the third of them the bounces
+    /// of the wave that were finished when the walk began, the fourth one the owner's. To be called before a walker is made of the memory.
+    pub fn refill_by(&mut self, turnover: Turnover) {
+        self.turnover = Some(turnover);
+    }
+
+    /// What is known of the slots of a wave that is kept full.
+    pub fn turnover(&self) -> Option<&Turnover> {
+        self.turnover.as_ref()
+    }
+
+    /// Set 0 for a [`Turnover`] and for kernels over its lists; that of the wave without one.
+    pub fn turnover_set(&self) -> WaveSet<'_> {
+        let wave = self.set(0);
+        match &self.turnover {
+            Some(turnover) => turnover.set(wave),
+            None => wave,
+        }
     }
 
     /// Whether walks have numbers of their own.

@@ -14,6 +14,8 @@ layout(local_size_x = 64) in;
 layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular samples
 #define CLERESTORY_GRID_BOUNDS HAS_AIRLIGHT
 
+#include "walk/count_fetches.glsl"
+
 #include "transport/features.glsl"
 #include "transport/media_features.glsl"
 #include "transport/path_set.glsl"
@@ -64,7 +66,7 @@ struct Segment {
 };
 
 // Whether light from outside reaches the inside of a body unbent: what is inside a solid that refracts has none but that of lamps inside.
-bool is_open(uint interior) { return interior == OUTSIDE || (material_quarter(interior, 7u).z & MATERIAL_BOUNDARY) != 0u; }
+bool is_open(uint interior) { return interior == OUTSIDE || (material_quarter(interior, 1u).w & MATERIAL_BOUNDARY) != 0u; }
 
 // Whether light has points that samples can be taken of.
 bool has_place(uint kind) {
@@ -95,7 +97,7 @@ float reckoned_collision_density(SceneMedium m, vec3 bands, float t, GridWalk wa
 // Light scattered once on the way, at a place chosen by the angle under which a point of a light sees it (Kulla and Fajardo 2012, 4.1 and 4.2).
 // True where there is some.
 bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMedium m, uint interior, Segment segment, GridWalk walk) {
-    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * status.rounds + DIMENSION_AIRLIGHT;
+    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot) + DIMENSION_AIRLIGHT;
     uvec2 word = sampler_bits(walk_sampler(slot, dimension));
     uint place_word = word.y;
     LightChoice choice = choose_light_by_power(word, pcg3d(uvec3(word, 0u)).x);
@@ -103,7 +105,7 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
         return false;
     }
     if (HAS_AREA_LIGHTS && choice.light.kind == LIGHT_TRIANGLE) {
-        place_word = sampler_bits(walk_sampler(slot, DIMENSION_FIRST_PLACE + status.rounds)).x;
+        place_word = sampler_bits(walk_sampler(slot, DIMENSION_FIRST_PLACE + walk_round(slot))).x;
     }
     LightPoint point = light_point(choice, word, push.scene_lower, push.scene_upper);
     EquiAngular e = airlight_from(path, bands, m, segment, walk, point.point.position);
@@ -205,6 +207,7 @@ void main() {
         walk_resume[place] = PLACE_SCATTERED;
     }
     uint slot = load_slot(place);
+    count_quarters(WALK_STATE_QUARTERS);
     WalkState path = load_walk(slot);
     uint automaton = 0u;
     if (HAS_PATH_AUTOMATON) {
@@ -245,9 +248,10 @@ void main() {
     bool lit = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
     bool lighting = lit && scattering && path_set_contains(push.path_set, path.bounce + 1u);
     lighting = lighting && (!HAS_PATH_AUTOMATON || (push.accepting >> after & 1u) != 0u);
-    // Draws of the medium are numbered by the round, which is the number of the path's ways so far.
-    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * status.rounds;
+    // Draws of the medium are numbered by the path's round, which is the number of its ways so far.
+    uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
     if (medium != NO_MEDIUM && way.end > way.start) {
+        count_quarters(medium_quarters() + (NUMBERED ? 1u : 0u));
         m = load_medium(medium);
         // Where collisions would only end the path, it goes on in proportion to the transmittance instead.
         bool passes = !scattering || m.sigma_s == vec3(0.0);
@@ -303,6 +307,7 @@ void main() {
         }
     }
     if (HAS_ABSORPTION && way.interior != OUTSIDE && outcome == GRID_LEFT) {
+        count_quarters(1u);
         weight *= exp(-load_material(way.interior).absorption * (way.end - max(way.start, 0.0)));
     }
     bool handled = true;
@@ -341,4 +346,5 @@ void main() {
         }
         walk_states_out[slot] = path;
     }
+    add_fetches(FETCHES_MEDIUM);
 }

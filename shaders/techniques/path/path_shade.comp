@@ -8,6 +8,8 @@
 
 layout(local_size_x = 64) in;
 
+#include "walk/count_fetches.glsl"
+
 #include "transport/features.glsl"
 #include "techniques/path/path_slots.glsl"
 #include "transport/arrival.glsl"
@@ -100,6 +102,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     }
     ScatteringFrame frame = scattering_frame(a, normal);
     uint bounce = path.bounce;
+    count_quarters(NUMBERED ? 1u : 0u);
 
     // Through what transmits, light comes from the other side, too.
     bool transmits = HAS_TRANSMISSION && m.transmission > 0.0;
@@ -181,10 +184,16 @@ void main() {
     uint slot = load_slot(place);
     vec3 radiance = vec3(0.0);
     uint flags = 0u;
+    count_quarters(HAS_TRANSMISSION ? WALK_STATE_QUARTERS : WALK_STATE_QUARTERS - 1u);
     WalkState path = load_walk(slot);
+    if (!HAS_TRANSMISSION) {
+        // Nothing has refracted: what would say so is not read.
+        path.eta_scale = 1.0;
+    }
     if (HAS_MEDIA) {
         MediumEvent event = walk_medium_events[place];
         if ((event.flags & EVENT_HANDLED) != 0u) {
+            add_fetches(FETCHES_SHADE);
             return;
         }
         flags = (event.flags & FLAG_AIRLIGHT) != 0u ? FLAG_AIRLIGHT | FLAG_WAITING : 0u;
@@ -195,4 +204,5 @@ void main() {
         walk_gathered[slot].radiance += radiance;
     }
     walk_flags_out[place] = flags;
+    add_fetches(FETCHES_SHADE);
 }

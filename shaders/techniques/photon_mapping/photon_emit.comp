@@ -121,7 +121,7 @@ void main() {
     float probability;
     Emission e = emit(slot, probability);
     uint bounce = path_set_joined(0u, PHOTON_UNDIFFUSED);
-    walk_states_out[slot] = WalkState(e.origin, 0.0, normalize(e.direction), bounce, e.flux, 1.0);
+    walk_states_out[slot] = WalkState(e.origin, 1.0, normalize(e.direction), bounce, e.flux, 0.0);
     walk_gathered[slot] = GatheredLight(vec3(0.0), OUTSIDE);
     if (HAS_DIFFERENTIALS) {
         // Only so many photons are of this light.

@@ -44,18 +44,20 @@ fn how_the_work_is_cut_up_never_shows() {
         let truth = render(gpu, &scene, [24, 16], 8, &PathTracerSettings::default());
         assert!(truth.mean()[0].0 > 0.0);
         println!("{:?}", truth.counters);
-        for (paths_in_flight, ray_quota, submission_work) in [
-            (0, 32_768, 0),
-            (64, 32_768, 0),
-            (1000, 128, 0),
-            (0, 32_768, 4096),
-            (1000, 128, 4096),
+        for (paths_in_flight, ray_quota, submission_work, whole_waves) in [
+            (0, 32_768, 0, true),
+            (64, 32_768, 0, false),
+            (1000, 128, 0, false),
+            (0, 32_768, 4096, false),
+            (1000, 128, 4096, false),
+            (1000, 128, 4096, true),
         ] {
-            let what = format!("{paths_in_flight} {ray_quota} {submission_work}");
+            let what = format!("{paths_in_flight} {ray_quota} {submission_work} {whole_waves}");
             let settings = PathTracerSettings {
                 paths_in_flight,
                 ray_quota,
                 submission_work,
+                whole_waves,
                 ..PathTracerSettings::default()
             };
             let picture = render(gpu, &scene, [24, 16], 8, &settings);

@@ -1,10 +1,11 @@
-//! `clerestory bench --sort`: keys per second of the radix sort beside sorts on the processor, in the same run.
+//! `clerestory bench --sort`: keys per second of the radix sort beside sorts on the processor, in the same run. Where one workgroup sorts in one dispatch, the form for
+//! more keys is timed beside it.
 //!
 //! Peers: the standard library's sorts, and with `--peers` those of the crates rdst (all threads, or one) and radsort. Every sorter sorts
 //! the same random keys; sorters take turns, and medians count.
 
 use clerestory::gpu::{BufferDesc, Category, Gpu};
-use clerestory::kernels::{Count, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
+use clerestory::kernels::{Count, Form, KeyWidth, RadixSort, RadixSortOptions, SortBuffers};
 use clerestory::{Error, Result};
 use clerestory_tools::experiments::plot::{self, Curve, PlotPoint, Words};
 use clerestory_tools::experiments::table::Table as Sheet;
@@ -16,8 +17,11 @@ use crate::failure::Outcome;
 use crate::output::{self, Table};
 use crate::outputs::NamedFile;
 
-/// Sizes as powers of two.
-const SIZES: [u32; 8] = [10, 12, 14, 16, 18, 20, 22, 24];
+/// Sizes as powers of two: all at which one workgroup may sort, and every other one.
+const SIZES: [u32; 12] = [8, 9, 10, 11, 12, 13, 14, 16, 18, 20, 22, 24];
+/// Names of the kernels: by the form that the engine chooses, and by that for more keys than one workgroup sorts.
+const KERNEL: &str = "kernel";
+const MANY_GROUPS: &str = "kernel, many workgroups";
 
 /// What is sorted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -41,7 +45,7 @@ impl Load {
 }
 
 /// The rate of one sorter at one size.
-#[derive(Debug, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Rate {
     load: Load,
     sorter: &'static str,
@@ -128,7 +132,22 @@ pub fn measure(gpu: &Gpu, repeat: u32, with_peers: bool) -> Result<Vec<Rate>> {
                 Load::Keys => of_keys(&keys, with_peers),
                 Load::Pairs => of_pairs(&pairs, with_peers),
             };
-            sorters.insert(0, by_kernel(gpu, &keys, load)?);
+            let sort = |form| {
+                let options = RadixSortOptions {
+                    form,
+                    ..RadixSortOptions::new(KeyWidth::Bits32, load == Load::Pairs)
+                };
+                RadixSort::new(gpu, options)
+            };
+            let auto = sort(Form::Auto)?;
+            if keys.len() as u32 <= auto.one_dispatch_up_to() {
+                let form = match Form::Auto.on(gpu.caps(), KERNEL)? {
+                    Form::Subgroup => Form::Subgroup,
+                    _ => Form::Serial,
+                };
+                sorters.insert(0, by_kernel(gpu, MANY_GROUPS, sort(form)?, &keys, load)?);
+            }
+            sorters.insert(0, by_kernel(gpu, KERNEL, auto, &keys, load)?);
             rates.extend(rates_of(sorters, load, &keys, repeat)?);
         }
     }
@@ -217,10 +236,9 @@ fn random_keys(count: u32) -> Vec<u32> {
     (0..count).map(|_| random.word()).collect()
 }
 
-fn by_kernel<'a>(gpu: &'a Gpu, keys: &'a [u32], load: Load) -> Result<Sorter<'a>> {
+fn by_kernel<'a>(gpu: &'a Gpu, name: &'static str, sort: RadixSort, keys: &'a [u32], load: Load) -> Result<Sorter<'a>> {
     let count = keys.len() as u32;
     let values = load == Load::Pairs;
-    let sort = RadixSort::new(gpu, RadixSortOptions::new(KeyWidth::Bits32, values))?;
     let sides = [sort.keys("keys", count)?, sort.keys("other keys", count)?];
     let values_of = [sort.values("values", count)?, sort.values("other values", count)?];
     let scratch = gpu.buffer(&BufferDesc::storage(
@@ -260,7 +278,7 @@ fn by_kernel<'a>(gpu: &'a Gpu, keys: &'a [u32], load: Load) -> Result<Sorter<'a>
         Ok(seconds)
     };
     Ok(Sorter {
-        name: "kernel",
+        name,
         run: Box::new(run),
     })
 }
@@ -287,9 +305,16 @@ fn cells(rates: &[Rate], load: Load, cell: impl Fn(&Rate) -> String) -> Vec<Vec<
             .collect(),
     ];
     for size in SIZES {
-        let of_size = rates.iter().filter(|rate| rate.load == load && rate.keys == 1 << size);
-        let row: Vec<String> = of_size.map(&cell).collect();
-        if !row.is_empty() {
+        let of_size: Vec<&Rate> = rates
+            .iter()
+            .filter(|rate| rate.load == load && rate.keys == 1 << size)
+            .collect();
+        if !of_size.is_empty() {
+            // A sorter may have been left out.
+            let of_sorter = |name: &&str| of_size.iter().find(|rate| rate.sorter == *name);
+            let row = names
+                .iter()
+                .map(|name| of_sorter(name).map_or_else(String::new, |rate| cell(rate)));
             rows.push([(1u32 << size).to_string()].into_iter().chain(row).collect());
         }
     }
@@ -417,6 +442,20 @@ mod tests {
         assert!(
             page.contains("| keys | std unstable |") && page.contains("| 1024 | "),
             "{page}"
+        );
+        // A sorter that has sorted nothing of a size leaves its place in the row.
+        let other = Rate {
+            load: Load::Keys,
+            sorter: MANY_GROUPS,
+            keys: 256,
+            keys_per_second: 1e6,
+            range: [1e6; 2],
+        };
+        let rows = cells(&[&rates[..], &[other]].concat(), Load::Keys, |rate| rate.sorter.into());
+        assert_eq!(rows[1][1..], ["", "", "", "", "", MANY_GROUPS]);
+        assert_eq!(
+            rows[2][1..],
+            ["std unstable", "std stable", "rdst", "rdst, one thread", "radsort", ""]
         );
         let made = files(&rates, &serde_json::json!({})).unwrap_or_default();
         let names: Vec<&str> = made.iter().map(|file| file.name.as_str()).collect();

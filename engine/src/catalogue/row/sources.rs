@@ -106,6 +106,7 @@ sources! {
     MILLER_HOFFMAN_1984 = "miller-hoffman-1984": "G. Miller, C. R. Hoffman", "Illumination and Reflection Maps", "SIGGRAPH course notes", 1984;
     MOLLER_TRUMBORE_1997 = "moller-trumbore-1997": "T. Möller, B. Trumbore", "Fast, Minimum Storage Ray/Triangle Intersection", "JGT 2(1)", 1997;
     NEYMAN_1934 = "neyman-1934": "J. Neyman", "On the Two Different Aspects of the Representative Method", "Journal of the Royal Statistical Society 97(4)", 1934;
+    NOVAK_2010 = "novak-2010": "J. Novák, V. Havran, C. Dachsbacher", "Path Regeneration for Interactive Path Tracing", "Eurographics short papers", 2010;
     NOVAK_2014 = "novak-2014": "J. Novák, A. Selle, W. Jarosz", "Residual Ratio Tracking for Estimating Attenuation in Participating Media", "SIGGRAPH Asia", 2014;
     NUSSELT_1928 = "nusselt-1928": "W. Nusselt", "Graphische Bestimmung des Winkelverhältnisses bei der Wärmestrahlung", "Zeitschrift des VDI 72", 1928;
     OPENEXR = "openexr": "Academy Software Foundation", "Technical Introduction to OpenEXR", "", 0;

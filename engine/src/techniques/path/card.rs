@@ -8,7 +8,7 @@ use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::{
-    path_camera, path_medium, path_numbers, path_resolve, path_resolve_shares, path_shade,
+    path_camera, path_medium, path_numbers, path_refill, path_resolve, path_resolve_shares, path_retire, path_shade,
 };
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
 use crate::gpu::{Buffer, PipelineInfo};
@@ -25,7 +25,7 @@ use crate::transport::{COMPENSATION, METAL_LOBES, PathSet, SURFACE_FEATURES};
 pub(in crate::techniques) const CARD: Card = Card {
     id: "path",
     summary: "unidirectional path tracing with next-event estimation and multiple importance sampling",
-    rows: &[ROWS, super::ROWS, super::adaptive::ROWS],
+    rows: &[ROWS, super::ROWS, super::full::ROWS, super::adaptive::ROWS],
     bias: Bias::Unbiased,
     needs: &[],
     kernels: &[&KERNELS],
@@ -76,8 +76,10 @@ fn law(settings: &Settings) -> Result<Law> {
 }
 
 /// What a picture may take, of whatever scene.
-pub(in crate::techniques) const KERNELS: [&ShaderInfo; 11] = [
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 13] = [
     &path_camera::INFO,
+    &path_refill::INFO,
+    &path_retire::INFO,
     &extend::INFO,
     &path_medium::INFO,
     &path_shade::INFO,
@@ -89,6 +91,10 @@ pub(in crate::techniques) const KERNELS: [&ShaderInfo; 11] = [
     &path_numbers::INFO,
     &path_resolve_shares::INFO,
 ];
+
+/// Counters of what is fetched, by [`Fetches::STAGES`](crate::walk::Fetches::STAGES).
+const FETCHED_TEXELS: [&str; 4] = ["extend_texels", "medium_texels", "shade_texels", "shadow_texels"];
+const FETCHED_BYTES: [&str; 4] = ["extend_bytes", "medium_bytes", "shade_bytes", "shadow_bytes"];
 
 impl Technique for PathTracer {
     fn step(&mut self, samples: u32) -> Result<Option<Step>> {
@@ -117,18 +123,24 @@ impl Technique for PathTracer {
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         let c = PathTracer::counters(self);
-        BTreeMap::from([
+        let mut all = BTreeMap::from([
             ("paths", c.paths),
             ("extend_rays", c.extend_rays),
             ("shadow_rays", c.shadow_rays),
             ("rays", c.extend_rays + c.shadow_rays),
             ("waves", c.waves),
+            ("slots", self.slots().into()),
             ("stalls", c.stalls),
             ("postponed", c.postponed),
             ("medium_collisions", c.medium_collisions),
             ("null_collisions", c.null_collisions),
             ("density_lookups", c.density_lookups),
-        ])
+        ]);
+        if PathTracer::settings(self).count_fetches {
+            all.extend(FETCHED_TEXELS.into_iter().zip(c.fetches.texels));
+            all.extend(FETCHED_BYTES.into_iter().zip(c.fetches.bytes));
+        }
+        all
     }
 
     fn pipelines(&self) -> Vec<PipelineInfo> {
@@ -171,6 +183,8 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/determinism.rs::threads_of_the_driver_and_of_the_host_never_show",
         "tests/tests/bounded_steps.rs::a_step_through_a_sparse_grid_is_one_submission_of_bounded_work",
         "tests/tests/bounded_steps.rs::rays_through_equal_triangles_are_parted_and_none_is_lost",
+        "tests/tests/fetches.rs::stages_fetch_what_is_counted",
+        "tests/tests/fetches.rs::diffuse_scenes_fetch_few_texels_a_segment",
     ],
     experiment: "clerestory agreement",
     api: &["clerestory::techniques::PathTracer"],

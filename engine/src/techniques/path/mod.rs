@@ -14,9 +14,12 @@
 
 mod adaptive;
 pub(super) mod card;
+mod full;
+mod in_order;
 mod kept;
 mod pipelines;
 mod record;
+mod refill;
 mod settings;
 mod unseen;
 mod wave;
@@ -26,8 +29,9 @@ use std::sync::Arc;
 use self::adaptive::AdaptiveSamples;
 pub(super) use self::card::CARD;
 use self::kept::KeptBySlot;
-use self::pipelines::{Pipelines, camera_pipeline};
-use self::record::{EyeStages, ResolveTarget, record_resolve};
+use self::pipelines::{CameraStage, Pipelines};
+use self::record::{EyeStages, ResolveTarget, UnderWay, record_resolve};
+use self::refill::{FullWave, ResultMemory, slot_numbers};
 pub use self::settings::{Adaptive, LightTreeUse, PathTracerSettings};
 pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
@@ -43,7 +47,8 @@ use crate::scene::camera_frame::CameraFrame;
 use crate::settings::TypedSettings;
 use crate::transport::GpuScene;
 use crate::walk::{
-    ArrivalStage, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots, slots_of_device,
+    ArrivalStage, Fetches, Turnover, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
+    slots_of_device,
 };
 use crate::{Error, Result};
 use glam::DVec3;
@@ -75,7 +80,30 @@ pub struct PathCounters {
     pub submissions: u64,
     /// Loop iterations of long rays and of walks through density grids, and steps of queries of maps: what bounds a submission.
     pub work: u64,
+    /// What stages have fetched, where that is counted ([`PathTracerSettings::count_fetches`]).
+    pub fetches: Fetches,
 }
+
+impl PathCounters {
+    /// Counts what a wave has taken between two submissions.
+    fn count(&mut self, before: &Walked, after: &Walked) {
+        let since = |count: fn(&Walked) -> u64| count(after) - count(before);
+        self.extend_rays += since(|w| w.rays);
+        // A place's two rays wait as one.
+        self.shadow_rays += since(|w| w.waited + w.media.second_rays);
+        self.stalls += since(|w| w.stalls);
+        self.postponed += since(|w| w.postponed);
+        self.submissions += since(|w| w.submissions);
+        self.work += since(|w| w.work);
+        self.medium_collisions += since(|w| w.media.collisions);
+        self.null_collisions += since(|w| w.media.null_collisions);
+        self.density_lookups += since(|w| w.media.density_lookups);
+        self.fetches += after.fetches.since(before.fetches);
+    }
+}
+
+/// Slots where nothing else is asked for: a wave that is kept full has a whole wave's over this, since it has no bounces of few paths.
+const WAVES_PER_FULL_WAVE: u32 = 2;
 
 /// A progressive rendering of one view.
 pub struct PathTracer {
@@ -97,6 +125,8 @@ pub struct PathTracer {
     pending: Option<Wave>,
     /// The wave under way.
     in_flight: Option<InFlight>,
+    /// In place of whole waves: one that is kept full.
+    full: Option<FullWave>,
     cursor: Cursor,
     counters: PathCounters,
 }
@@ -123,7 +153,9 @@ impl PathTracer {
     ) -> Result<Self> {
         settings.check()?;
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
+        let full_wave = settings.keeps_waves_full();
         let slots = match settings.paths_in_flight {
+            0 if full_wave => default_slots(gpu) / WAVES_PER_FULL_WAVE,
             0 => default_slots(gpu),
             wanted => wanted.next_multiple_of(WALK_GROUP),
         };
@@ -149,18 +181,34 @@ impl PathTracer {
         let band = film.bands().iter().map(|band| u64::from(band.pixels())).max();
         let pixel_bytes = size_of::<FilmPixel>().max(size_of::<FilmAov>()) as u64;
         let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
-        let numbered = settings.adaptive != Adaptive::Off;
-        let (mut buffers, (kept, numbers)) = WaveBuffers::within_memory(gpu, slots, needs, |slots| {
+        let adaptive = settings.adaptive != Adaptive::Off;
+        let more = |slots| {
             let kept = KeptBySlot::new(gpu, slots, film.has_aovs(), light_tree.is_some())?;
-            let numbers = numbered
-                .then(|| gpu.storage_texels("path numbers", Category::Work, vk::Format::R32G32_UINT, slots.into()));
-            let numbers = numbers.transpose()?;
-            gpu.buffer(&reading).map(|_| (kept, numbers))
-        })?;
+            let adaptive_numbers = || {
+                let format = vk::Format::R32G32_UINT;
+                gpu.storage_texels("path numbers", Category::Work, format, slots.into())
+            };
+            let adaptive = adaptive.then(adaptive_numbers).transpose()?;
+            let full = || -> Result<_> {
+                let results = ResultMemory::new(gpu, slots, film.has_aovs())?;
+                Ok((Turnover::new(gpu, slots)?, slot_numbers(gpu, slots)?, results))
+            };
+            let full = full_wave.then(full).transpose()?;
+            gpu.buffer(&reading).map(|_| (kept, adaptive, full))
+        };
+        let (mut buffers, (kept, numbers, full)) = WaveBuffers::within_memory(gpu, slots, needs, more)?;
         let adaptive = match numbers {
             Some(numbers) => {
                 buffers.number_by(numbers.clone());
                 Some(AdaptiveSamples::new(gpu, &settings, &film, numbers)?)
+            }
+            None => None,
+        };
+        let full = match full {
+            Some((turnover, numbers, results)) => {
+                buffers.number_by(numbers.clone());
+                buffers.refill_by(turnover);
+                Some(FullWave::new(gpu, numbers, results, settings.aovs)?)
             }
             None => None,
         };
@@ -169,6 +217,7 @@ impl PathTracer {
             shadows: needs.waiting,
             ray_quota: settings.ray_quota,
             work: settings.submission_work,
+            count_fetches: settings.count_fetches,
             ..WalkOptions::default()
         };
         let walker = Walker::new(gpu, Arc::clone(&scene), buffers, options)?;
@@ -186,6 +235,7 @@ impl PathTracer {
             adaptive,
             pending: None,
             in_flight: None,
+            full,
             cursor: Cursor::default(),
             counters: PathCounters::default(),
         })
@@ -197,7 +247,8 @@ impl PathTracer {
     /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         let frame = CameraFrame::new(camera, self.film.size())?;
-        let pipeline = camera_pipeline(&self.gpu, &self.settings, &frame, camera)?;
+        let has_media = self.scene.profile().media.any();
+        let pipeline = CameraStage::new(&self.gpu, &self.settings, has_media, &frame, camera)?;
         // First what can fail: views must not mix.
         self.film.clear()?;
         self.pipelines.camera = pipeline;
@@ -220,6 +271,9 @@ impl PathTracer {
     fn begin_anew(&mut self) -> Result<()> {
         (self.pending, self.in_flight) = (None, None);
         self.cursor = Cursor::default();
+        if let Some(full) = &mut self.full {
+            full.clear();
+        }
         if let Some(adaptive) = &mut self.adaptive {
             adaptive.restart(&self.film);
         }
@@ -229,8 +283,8 @@ impl PathTracer {
         Ok(())
     }
 
-    /// Makes one submission towards `samples` samples per pixel, a bounded piece of work whatever the scene; `None` when all samples are there. A wave that takes
-    /// more than one goes on with the next step where it was, and its samples count once all of its paths have ended. The first wave also compiles the kernels.
+    /// Makes one submission towards `samples` samples per pixel, a bounded piece of work whatever the scene; `None` when all samples are there. Paths that take
+    /// more than one go on with the next step where they were, and samples count once all before them have ended. The first submission also compiles the kernels.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
@@ -240,6 +294,9 @@ impl PathTracer {
 
     /// As [`PathTracer::step`], with a stage of a technique's own in each bounce.
     pub(crate) fn step_with(&mut self, samples: u32, arrival: Option<&dyn ArrivalStage>) -> Result<Option<Step>> {
+        if self.full.is_some() {
+            return self.step_full(samples, arrival);
+        }
         // A wave under way goes on, whatever is asked for meanwhile; one that fails is rendered again by the next step.
         let mut in_flight = match self.in_flight.take() {
             Some(in_flight) => in_flight,
@@ -287,9 +344,10 @@ impl PathTracer {
     pub(crate) fn step_so_far(&self, timings: Vec<Timings>, samples: u32) -> Step {
         let [width, height] = self.film.size();
         let wanted = u64::from(samples) * u64::from(width) * u64::from(height);
+        let done = self.full.as_ref().map_or(self.cursor.done, |full| full.samples.ended());
         Step {
             timings,
-            done: self.cursor.done.min(wanted),
+            done: done.min(wanted),
             wanted,
         }
     }
@@ -343,6 +401,7 @@ impl PathTracer {
         all.push(p.resolve.info());
         all.extend(p.medium.as_ref().map(ComputePipeline::info));
         all.extend(self.adaptive.iter().flat_map(AdaptiveSamples::pipelines));
+        all.extend(self.full.iter().map(|full| full.refill.pipeline()));
         all
     }
 
@@ -379,33 +438,25 @@ impl PathTracer {
             adaptive: self.adaptive.as_ref(),
             kept: &self.kept,
             light_tree: self.light_tree.as_ref(),
-            wave: *wave,
             arrival,
-            pending: &mut self.pending,
+            under_way: UnderWay::Whole {
+                wave: *wave,
+                pending: &mut self.pending,
+            },
         };
         let before = walks.walked().clone();
         self.walker.advance(walks, &mut stages)?;
-        let (counters, walked) = (&mut self.counters, walks.walked());
-        let since = |count: fn(&Walked) -> u64| count(walked) - count(&before);
-        counters.extend_rays += since(|w| w.rays);
-        // A place's two rays wait as one.
-        counters.shadow_rays += since(|w| w.waited + w.media.second_rays);
-        counters.stalls += since(|w| w.stalls);
-        counters.postponed += since(|w| w.postponed);
-        counters.submissions += since(|w| w.submissions);
-        counters.work += since(|w| w.work);
-        counters.medium_collisions += since(|w| w.media.collisions);
-        counters.null_collisions += since(|w| w.media.null_collisions);
-        counters.density_lookups += since(|w| w.media.density_lookups);
+        self.counters.count(&before, walks.walked());
         if walks.has_ended() {
-            counters.paths += u64::from(wave.paths());
-            counters.waves += 1;
+            self.counters.paths += u64::from(wave.paths());
+            self.counters.waves += 1;
         }
         Ok(walks.take_timings())
     }
 
-    /// Adds the last wave to the film.
+    /// Adds to the film what has ended.
     fn flush(&mut self) -> Result<()> {
+        self.flush_full()?;
         let Some(wave) = &self.pending else { return Ok(()) };
         let mut recorder = self.gpu.recorder("path film")?;
         let buffers = self.walker.buffers();

@@ -1,36 +1,63 @@
 //! The path tracer's own kernels, specialized to what a scene needs.
 
-use super::settings::{Adaptive, PathTracerSettings};
+use super::settings::PathTracerSettings;
 use crate::Result;
-use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_resolve, path_shade};
-use crate::gpu::{ComputePipeline, Gpu};
+use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_refill, path_resolve, path_shade};
+use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::{GpuScene, surface_spec};
 
 /// One kernel a stage of its own.
 pub(super) struct Pipelines {
-    pub camera: ComputePipeline<path_camera::Kernel>,
+    pub camera: CameraStage,
     /// Only where there are media.
     pub medium: Option<ComputePipeline<path_medium::Kernel>>,
     pub shade: ComputePipeline<path_shade::Kernel>,
     pub resolve: ComputePipeline<path_resolve::Kernel>,
 }
 
-/// The first stage; it alone depends on the camera.
-pub(super) fn camera_pipeline(
-    gpu: &Gpu,
-    settings: &PathTracerSettings,
-    frame: &CameraFrame,
-    camera: &Camera,
-) -> Result<ComputePipeline<path_camera::Kernel>> {
-    gpu.compute_pipeline(&path_camera::Spec {
-        sampler_kind: settings.sampler as u32,
-        has_lens: camera.lens_radius > 0.0 && !frame.orthographic,
-        orthographic: frame.orthographic,
-        write_aovs: settings.aovs,
-        numbered: settings.adaptive != Adaptive::Off,
-    })
+/// The first stage: of whole waves, or of waves that are kept full. It alone depends on the camera.
+pub(super) enum CameraStage {
+    Whole(ComputePipeline<path_camera::Kernel>),
+    Refilled(ComputePipeline<path_refill::Kernel>),
+}
+
+impl CameraStage {
+    pub fn new(
+        gpu: &Gpu,
+        settings: &PathTracerSettings,
+        has_media: bool,
+        frame: &CameraFrame,
+        camera: &Camera,
+    ) -> Result<Self> {
+        let has_lens = camera.lens_radius > 0.0 && !frame.orthographic;
+        if settings.keeps_waves_full() {
+            let refill = gpu.compute_pipeline(&path_refill::Spec {
+                sampler_kind: settings.sampler as u32,
+                has_lens,
+                orthographic: frame.orthographic,
+                write_aovs: settings.aovs,
+                has_media,
+            });
+            return Ok(Self::Refilled(refill?));
+        }
+        let whole = gpu.compute_pipeline(&path_camera::Spec {
+            sampler_kind: settings.sampler as u32,
+            has_lens,
+            orthographic: frame.orthographic,
+            write_aovs: settings.aovs,
+            numbered: settings.numbers_samples(),
+        });
+        Ok(Self::Whole(whole?))
+    }
+
+    pub fn info(&self) -> PipelineInfo {
+        match self {
+            Self::Whole(camera) => camera.info(),
+            Self::Refilled(camera) => camera.info(),
+        }
+    }
 }
 
 impl Pipelines {
@@ -52,12 +79,13 @@ impl Pipelines {
             has_punctual_lights: scene.has_punctual_lights(),
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
-            numbered: settings.adaptive != Adaptive::Off,
+            numbered: settings.numbers_samples(),
             has_alpha: profile.has_alpha(),
             has_media: profile.media.any(),
             has_light_tree,
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
+            count_fetches: settings.count_fetches,
         });
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.
@@ -79,11 +107,12 @@ impl Pipelines {
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             has_airlight: settings.equiangular && scene.airlight_helps(),
+            count_fetches: settings.count_fetches,
             ..Default::default()
         };
         let medium = shade.has_media.then(|| gpu.compute_pipeline(&medium)).transpose()?;
         Ok(Self {
-            camera: camera_pipeline(gpu, settings, frame, camera)?,
+            camera: CameraStage::new(gpu, settings, profile.media.any(), frame, camera)?,
             medium,
             shade: gpu.compute_pipeline(&shade)?,
             resolve: gpu.compute_pipeline(&path_resolve::Spec {

@@ -1,19 +1,22 @@
 //! The passes of a wave of eye paths beside those of all walks: what each stage reads, and the barriers between them.
 
 use super::adaptive::AdaptiveSamples;
+use super::in_order::{Piece, SamplesInOrder};
 use super::kept::KeptBySlot;
-use super::pipelines::Pipelines;
+use super::pipelines::{CameraStage, Pipelines};
+use super::refill::RefillStage;
 use super::settings::PathTracerSettings;
 use super::wave::Wave;
 use crate::Result;
 use crate::film::GpuFilm;
 use crate::gpu::shaders::constants::{NO_MEDIUM, OUTSIDE};
-use crate::gpu::shaders::sets::WaveSet;
+use crate::gpu::shaders::sets::{PathSlotSet, WaveSet};
 use crate::gpu::shaders::techniques::path::{path_camera, path_resolve, path_shade};
-use crate::gpu::{Access, Recorder, TexelView};
+use crate::gpu::shaders::types::CameraView;
+use crate::gpu::{Access, ComputePipeline, Pass, Recorder, TexelView};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
-use crate::walk::{ArrivalStage, Bounce, WalkStages, WaveBuffers, stage_barrier};
+use crate::walk::{ArrivalStage, Bounce, Refill, WalkKey, WalkStages, WaveBuffers, stage_barrier};
 use glam::DVec3;
 
 /// What the stages of eye paths need: all of a path tracer but its walker.
@@ -27,56 +30,37 @@ pub(super) struct EyeStages<'a> {
     pub adaptive: Option<&'a AdaptiveSamples>,
     pub kept: &'a KeptBySlot,
     pub light_tree: Option<&'a TexelView>,
-    pub wave: Wave,
     pub arrival: Option<&'a dyn ArrivalStage>,
-    /// The last wave, until it has reached the film.
-    pub pending: &'a mut Option<Wave>,
+    pub under_way: UnderWay<'a>,
+}
+
+/// The samples of a submission.
+pub(super) enum UnderWay<'a> {
+    Whole {
+        wave: Wave,
+        /// The last wave, until it has reached the film.
+        pending: &'a mut Option<Wave>,
+    },
+    Full {
+        refill: &'a RefillStage,
+        samples: &'a mut SamplesInOrder,
+        /// Those that begin.
+        begins: Vec<Piece>,
+    },
 }
 
 impl EyeStages<'_> {
-    /// What the stages of a bounce are told, both the same.
-    fn push(&self) -> path_shade::Push {
-        let (scene, settings) = (self.scene, self.settings);
-        let [lower, upper] = scene.bounds().map(|corner| corner.to_array());
-        path_shade::Push {
-            scene_lower: lower,
-            path_set: settings.path_set.packed(),
-            scene_upper: upper,
-            roulette_cap: settings.roulette_cap,
-            key: self.wave.key(settings.seed),
-            roulette_start: settings.roulette_start,
-            surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
-            accepting: settings.path_set.accepting(),
-            successors: settings.path_set.successors(),
-        }
-    }
-}
-
-impl WalkStages for EyeStages<'_> {
-    /// The last wave's way to the film.
-    fn record_before(&mut self, recorder: &mut Recorder, buffers: &WaveBuffers) -> Result<()> {
-        match &*self.pending {
-            Some(pending) => {
-                let target = ResolveTarget {
-                    film: self.film,
-                    adaptive: self.adaptive,
-                };
-                record_resolve(recorder, self.pipelines, target, buffers, self.kept, pending)
-            }
-            None => Ok(()),
+    /// What random numbers are keyed by; the seed alone where slots have numbers of their own.
+    fn key(&self) -> WalkKey {
+        match &self.under_way {
+            UnderWay::Whole { wave, .. } => wave.key(self.settings.seed),
+            UnderWay::Full { .. } => seed_alone(self.settings.seed),
         }
     }
 
-    fn submitted(&mut self) {
-        *self.pending = None;
-    }
-
-    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
-        if let Some(adaptive) = self.adaptive {
-            adaptive.record_numbers(recorder, &self.film.bands()[self.wave.band], &self.wave)?;
-        }
+    fn view(&self) -> CameraView {
         let v = self.frame;
-        let push = path_camera::Push {
+        CameraView {
             origin: v.origin,
             half_width: v.half_width,
             right: v.right,
@@ -87,17 +71,95 @@ impl WalkStages for EyeStages<'_> {
             focus_distance: v.focus_distance,
             width: self.film.size()[0],
             height: self.film.size()[1],
-            slot_count: self.wave.paths(),
             interior: self.scene.body_around(self.eye).unwrap_or(OUTSIDE),
-            key: self.wave.key(self.settings.seed),
+        }
+    }
+
+    /// What the stages of a bounce are told, both the same.
+    fn push(&self) -> path_shade::Push {
+        let (scene, settings) = (self.scene, self.settings);
+        let [lower, upper] = scene.bounds().map(|corner| corner.to_array());
+        path_shade::Push {
+            scene_lower: lower,
+            path_set: settings.path_set.packed(),
+            scene_upper: upper,
+            roulette_cap: settings.roulette_cap,
+            key: self.key(),
+            roulette_start: settings.roulette_start,
+            surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
+            accepting: settings.path_set.accepting(),
+            successors: settings.path_set.successors(),
+        }
+    }
+}
+
+impl WalkStages for EyeStages<'_> {
+    /// The way of samples that have ended to the film.
+    fn record_before(&mut self, recorder: &mut Recorder, buffers: &WaveBuffers) -> Result<()> {
+        match &self.under_way {
+            UnderWay::Whole { pending, .. } => match &**pending {
+                Some(pending) => {
+                    let target = ResolveTarget {
+                        film: self.film,
+                        adaptive: self.adaptive,
+                    };
+                    record_resolve(recorder, self.pipelines, target, buffers, self.kept, pending)
+                }
+                None => Ok(()),
+            },
+            UnderWay::Full {
+                refill,
+                samples,
+                begins,
+            } if samples.are_pending() || !begins.is_empty() => {
+                let pending = samples.pending();
+                refill.record_turnover(recorder, self.pipelines, self.film, buffers, self.kept, &pending)
+            }
+            UnderWay::Full { .. } => Ok(()),
+        }
+    }
+
+    fn submitted(&mut self) {
+        match &mut self.under_way {
+            UnderWay::Whole { pending, .. } => **pending = None,
+            UnderWay::Full { samples, .. } => samples.resolve(),
+        }
+    }
+
+    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+        let (UnderWay::Whole { wave: samples, .. }, CameraStage::Whole(camera)) =
+            (&self.under_way, &self.pipelines.camera)
+        else {
+            return Ok(());
         };
-        let camera = &self.pipelines.camera;
+        if let Some(adaptive) = self.adaptive {
+            adaptive.record_numbers(recorder, &self.film.bands()[samples.band], samples)?;
+        }
+        let push = path_camera::Push {
+            view: self.view(),
+            key: self.key(),
+            slot_count: samples.paths(),
+        };
         recorder.pass("path: camera", |pass| {
-            let groups = [camera.groups_for(self.wave.paths()), 1, 1];
+            let groups = [camera.groups_for(samples.paths()), 1, 1];
             pass.dispatch(camera, &[wave, &self.kept.set()], &push, groups)?;
             stage_barrier(pass);
             Ok(())
         })
+    }
+
+    fn record_refill(
+        &self,
+        recorder: &mut Recorder,
+        buffers: &WaveBuffers,
+        wave: &WaveSet<'_>,
+        at: Refill,
+    ) -> Result<()> {
+        let UnderWay::Full { refill, begins, .. } = &self.under_way else {
+            return Ok(());
+        };
+        let (camera, view, seed) = (&self.pipelines.camera, self.view(), self.settings.seed);
+        refill.record_begin(recorder, camera, view, seed, buffers, wave, self.kept, begins, at)
     }
 
     fn arrival(&self) -> Option<&dyn ArrivalStage> {
@@ -137,6 +199,16 @@ impl WalkStages for EyeStages<'_> {
     }
 }
 
+/// The key of walks that have numbers of their own.
+pub(super) fn seed_alone(seed: u32) -> WalkKey {
+    WalkKey {
+        first_sequence: 0,
+        first_index: 0,
+        indices: 0,
+        seed,
+    }
+}
+
 /// Where a wave's samples go.
 #[derive(Clone, Copy)]
 pub(super) struct ResolveTarget<'a> {
@@ -153,24 +225,76 @@ pub(super) fn record_resolve(
     kept: &KeptBySlot,
     wave: &Wave,
 ) -> Result<()> {
-    let band = &target.film.bands()[wave.band];
     let (walks, kept) = (buffers.set(0), kept.set());
+    let Some(adaptive) = target.adaptive else {
+        let piece = Piece {
+            wave: *wave,
+            first: 0,
+            count: wave.paths(),
+            result: 0,
+        };
+        let from = FilmPieces {
+            walks,
+            kept,
+            pieces: &[piece],
+        };
+        return record_pieces(recorder, &pipelines.resolve, target.film, &from);
+    };
     recorder.pass("path: resolve", |pass| {
-        if let Some(adaptive) = target.adaptive {
-            adaptive.resolve(pass, &walks, &kept, band, wave)?;
-        } else {
-            let push = path_resolve::Push {
-                first_film_pixel: wave.first_pixel - band.first_pixel(),
-                pixel_count: wave.pixels,
-                sample_count: wave.samples,
-            };
-            let groups = [pipelines.resolve.groups_for(wave.pixels), 1, 1];
-            pass.dispatch(&pipelines.resolve, &[&walks, &kept, &band.set()], &push, groups)?;
-        }
-        pass.memory_barrier(
-            Access::COMPUTE,
-            Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,
-        );
+        adaptive.resolve(pass, &walks, &kept, &target.film.bands()[wave.band], wave)?;
+        leave_film(pass);
         Ok(())
     })
+}
+
+/// Samples for the film, and what has them: `walk_gathered` and `path_aovs`, by result.
+pub(super) struct FilmPieces<'a> {
+    pub walks: WaveSet<'a>,
+    pub kept: PathSlotSet<'a>,
+    pub pieces: &'a [Piece],
+}
+
+/// The way of consecutive samples to the film, piece by piece, each of which may end within a pixel.
+pub(super) fn record_pieces(
+    recorder: &mut Recorder,
+    resolve: &ComputePipeline<path_resolve::Kernel>,
+    film: &GpuFilm,
+    from: &FilmPieces<'_>,
+) -> Result<()> {
+    if from.pieces.is_empty() {
+        return Ok(());
+    }
+    recorder.pass("path: resolve", |pass| {
+        for Piece {
+            wave,
+            first,
+            count,
+            result,
+        } in from.pieces
+        {
+            let band = &film.bands()[wave.band];
+            let (pixel, end) = (first / wave.samples, (first + count).div_ceil(wave.samples));
+            let push = path_resolve::Push {
+                first_film_pixel: wave.first_pixel - band.first_pixel() + pixel,
+                pixel_count: end - pixel,
+                sample_count: wave.samples,
+                first_sample: first % wave.samples,
+                slot_count: *count,
+                first_slot: *result,
+            };
+            let groups = [resolve.groups_for(end - pixel), 1, 1];
+            pass.dispatch(resolve, &[&from.walks, &from.kept, &band.set()], &push, groups)?;
+            // The next piece may go on within the pixel.
+            leave_film(pass);
+        }
+        Ok(())
+    })
+}
+
+/// The barrier behind samples that were added.
+fn leave_film(pass: &mut Pass<'_>) {
+    pass.memory_barrier(
+        Access::COMPUTE,
+        Access::COMPUTE | Access::TRANSFER_WRITE | Access::TRANSFER_READ,
+    );
 }

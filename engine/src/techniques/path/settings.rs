@@ -95,8 +95,25 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
+        /// Ends each wave of paths before the next one begins, in place of new paths taking the slots of those that have ended; adaptive samples have whole waves in any case.
+        /// Never changes the picture: for measuring, and for techniques that look at a wave as a whole.
+        pub whole_waves: bool = false;
+        /// Counts what is fetched ([`PathCounters::fetches`](crate::techniques::path::PathCounters::fetches)), by other kernels. Never changes the picture: for measuring.
+        pub count_fetches: bool = false;
         /// Work, in loop iterations, after which a submission begins no further place, as [`WalkOptions::work`](crate::walk::WalkOptions::work);
         /// 0 chooses by the kind of device. Never changes the picture.
         pub submission_work: u64 = 0;
+    }
+}
+
+impl PathTracerSettings {
+    /// Whether new paths take the slots of those that have ended. A round of adaptive samples follows from all samples before it.
+    pub(super) fn keeps_waves_full(&self) -> bool {
+        self.adaptive == Adaptive::Off && !self.whole_waves
+    }
+
+    /// Whether slots have pixels and samples of their own.
+    pub(super) fn numbers_samples(&self) -> bool {
+        self.adaptive != Adaptive::Off || self.keeps_waves_full()
     }
 }

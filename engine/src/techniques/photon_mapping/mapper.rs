@@ -125,6 +125,8 @@ impl PhotonMapper {
             seed: settings.seed,
             aovs: settings.aovs,
             submission_work: settings.submission_work,
+            // What arrives is gathered and counted wave by wave, for each pass of photons.
+            whole_waves: true,
             ..PathTracerSettings::default()
         };
         let has_map = settings.needs_photons() && scene.has_lights();

@@ -1,7 +1,7 @@
 //! `clerestory index --peers`: build times, surface area cost and rays per second of our indexes beside those of other libraries, and where our
 //! rays' time goes.
 //!
-//! Ours are traced by the device's kernel, theirs on the processor with all threads; on a software device both share the same cores. The driver's own
+//! Ours are traced by the device's kernel, whether the processor has built them or the device, theirs on the processor with all threads; on a software device both share the same cores. The driver's own
 //! acceleration structure is a peer where the device has ray queries.
 //! Primary rays go through the pixels of the scene's first camera; diffuse ones leave what these meet by the cosine. All tracers see the
 //! same rays in the same order, take turns, and medians count. Their hits are compared ray by ray with ours of the binned index, which are
@@ -277,6 +277,8 @@ fn one_scene(
     for one in &built {
         contenders.push(ours::contender(gpu, one, &rays)?);
     }
+    contenders.extend(ours::unwatched(gpu, triangles, &rays, repeat)?);
+    let ours = contenders.len();
     if gpu.caps().ray_query {
         contenders.push(ours::by_driver(gpu, triangles, &rays, repeat)?);
     }
@@ -300,7 +302,7 @@ fn one_scene(
         found.indexes.push(Measured {
             scene: address.to_owned(),
             index: contender.name.clone(),
-            is_ours: i < built.len(),
+            is_ours: i < ours,
             triangles: triangles.len(),
             build: contender.build,
             sah_cost: contender.sah_cost,

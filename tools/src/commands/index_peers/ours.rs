@@ -1,12 +1,12 @@
-//! Our indexes in the comparison: built on the processor, traced by the device's kernel with an invocation per ray. And the driver's, traced by the same
-//! kernel with ray queries.
+//! Our indexes in the comparison: built on the processor or on the device, traced by the device's kernel with an invocation per ray. And the driver's, traced by the
+//! same kernel with ray queries.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings};
 use clerestory::accel::driver::DriverIndex;
 use clerestory::accel::lbvh::{self, BuildQuality, LbvhSettings};
 use clerestory::accel::trace::TraceSettings;
-use clerestory::accel::wide::{LEAF_SIZE, WideBvh, WideSettings};
-use clerestory::accel::{DeviceTraversal, Hit, IndexBinding, Ray, RayIndex};
+use clerestory::accel::wide::{LEAF_SIZE, WideBuilder, WideBvh, WideSettings};
+use clerestory::accel::{DeviceTraversal, Hit, IndexBinding, IndexKind, Ray, RayIndex};
 use clerestory::gpu::ash::vk::Format;
 use clerestory::gpu::shaders::accel::trace_rays;
 use clerestory::gpu::{
@@ -213,6 +213,38 @@ pub fn contender<'a>(gpu: &'a Gpu, built: &Built, rays: &[Vec<Ray>; 2]) -> Resul
         sah_cost: Some(built.index.index().statistics().sah_cost),
         trace: traced_by(kernel),
     })
+}
+
+/// Our indexes whose rays are not watched step by step, beside [`INDEXES`]: two levels of one instance, which shows what the level above costs where there is nothing to
+/// share, and the wide tree that the device builds, uploads included; none of the latter of fewer than two triangles.
+pub fn unwatched<'a>(
+    gpu: &'a Gpu,
+    triangles: &[[Vec3; 3]],
+    rays: &[Vec<Ray>; 2],
+    repeat: u32,
+) -> Result<Vec<Contender<'a>>> {
+    let sets: [&[Ray]; 2] = [&rays[0], &rays[1]];
+    let settings = WideSettings::default();
+    let kind = IndexKind::TwoLevel(settings);
+    let (two_level, build) = built_in(repeat, || kind.build(triangles))?;
+    let mut all = vec![Contender {
+        name: format!("{}, one instance", kind.name()),
+        build,
+        sah_cost: Some(two_level.statistics().sah_cost),
+        trace: traced_by(Kernel::new(gpu, two_level.as_ref(), &sets)?),
+    }];
+    let builder = WideBuilder::new(gpu, &settings)?;
+    let (resident, build) = built_in(repeat, || builder.build_resident(triangles))?;
+    if let Some(resident) = resident {
+        let kernel = Kernel::of(gpu, resident.texels, None, DeviceTraversal::Wide, &sets)?;
+        all.push(Contender {
+            name: IndexKind::WideOnDevice(settings).name().into(),
+            build,
+            sah_cost: Some(resident.statistics.sah_cost),
+            trace: traced_by(kernel),
+        });
+    }
+    Ok(all)
 }
 
 /// The driver's acceleration structure, built on the device, boxes and uploads included.
