@@ -45,6 +45,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::maps::cube::ROWS,
     crate::maps::directional_map::ROWS,
     crate::maps::equal_area::ROWS,
+    crate::maps::gather::ROWS,
     crate::maps::impostor::ROWS,
     crate::maps::impostor::places::ROWS,
     crate::maps::impostor::proxy::ROWS,

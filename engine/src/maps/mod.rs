@@ -10,6 +10,7 @@
 //! - [`directional_map`]: levels with borders on the device; [`spherical_sat`], [`box_lobe`] and [`prefilter`]: glossy look-ups;
 //! - [`to_lat_long`]: a latitude–longitude map of one that was drawn;
 //! - [`irradiance`]: what a surface receives;
+//! - [`gather`]: the light of a coarse map's texels at other places than its own;
 //! - [`impostor`]: maps with distances, and what rays meet by them;
 //! - [`packed_direction`]: directions in a word; [`turn`]: the angles that maps take.
 //!
@@ -33,6 +34,7 @@ pub mod cube;
 pub mod directional_map;
 mod disc;
 pub mod equal_area;
+pub mod gather;
 mod image;
 pub mod impostor;
 pub mod irradiance;
