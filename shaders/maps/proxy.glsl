@@ -2,6 +2,9 @@
 #ifndef CLERESTORY_MAPS_PROXY_GLSL
 #define CLERESTORY_MAPS_PROXY_GLSL
 
+// Farther than any wall: that of one that a ray runs along.
+const float PROXY_FAR = 3e38;
+
 // Distance along a ray from x in the unit direction r to where it leaves the sphere about the map's place.
 float sphere_proxy(vec3 x, vec3 r, float radius) {
     float along = dot(x, r);
@@ -12,7 +15,7 @@ float sphere_proxy(vec3 x, vec3 r, float radius) {
 // The same of a box.
 float box_proxy(vec3 x, vec3 r, vec3 low, vec3 high) {
     vec3 walls = mix(high, low, lessThan(r, vec3(0.0)));
-    vec3 far = mix((walls - x) / r, vec3(uintBitsToFloat(0x7F800000u)), equal(r, vec3(0.0)));
+    vec3 far = mix((walls - x) / r, vec3(PROXY_FAR), equal(r, vec3(0.0)));
     return max(min(far.x, min(far.y, far.z)), 0.0);
 }
 
