@@ -143,7 +143,7 @@ fn what_a_setting_does_not_need_has_no_bytes_and_bad_ones_are_refused() {
         }
         let octahedron = Parametrization::OctahedronQuadratic;
         let (radiance, impostor) = LitRoom::EVEN.maps(octahedron, 32).unwrap();
-        let lights = GatherLights::new(&radiance, &impostor, 8, SolidAngleForm::Disc).unwrap();
+        let lights = GatherLights::new(&radiance, &impostor, 16, SolidAngleForm::Disc).unwrap();
         let point = GatherPoint {
             position: DVec3::ZERO,
             axis: DVec3::Z,

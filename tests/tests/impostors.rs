@@ -139,11 +139,11 @@ fn every_method_is_its_twin_to_the_bit_over_runs() {
         let image = ImpostorImage::from_fn(map, UVec2::splat(64), 2, true, |d| BoxRoom::BOX.surfaces(d)).unwrap();
         let impostor = Impostor::new(gpu, &image).unwrap();
         let mut rays = ShinySphere::BOX.rays(32, None);
-        // At the map's place, through it, and along an axis from a wall.
+        // At the map's place, through it, and along a wall.
         for (origin, direction) in [
             (DVec3::ZERO, DVec3::new(0.6, 0.0, 0.8)),
             (DVec3::new(-0.5, 0.0, 0.0), DVec3::X),
-            (DVec3::new(0.0, 1.0, 0.0), DVec3::X),
+            (DVec3::new(0.0, 0.9, 0.0), DVec3::X),
         ] {
             rays.push(ImpostorRay { origin, direction });
         }
@@ -161,7 +161,7 @@ fn every_method_is_its_twin_to_the_bit_over_runs() {
             for (ray, hit) in rays.iter().zip(&hits).rev().take(3) {
                 let twin = image.search(ray, &settings);
                 assert!(
-                    (hit.distance - twin.distance).abs() <= 1e-3 * twin.distance,
+                    (hit.distance - twin.distance).abs() <= 1e-3 + 1e-3 * twin.distance,
                     "{method} {ray:?}: {hit:?} {twin:?}"
                 );
             }
