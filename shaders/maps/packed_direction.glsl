@@ -4,6 +4,9 @@
 
 #include "maps/octahedron.glsl"
 
+// Bits of each coordinate of the normals of maps.
+const uint PACKED_NORMAL_BITS = 16u;
+
 // A unit vector with so many bits (2 to 16) for each of the two coordinates, the first ones lowest.
 uint pack_octahedral(vec3 n, uint bits) {
     vec2 p = octahedron_encode(n);

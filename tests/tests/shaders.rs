@@ -46,6 +46,8 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Comparisons of specialization constants.
     ("twin_random.comp", "SpecConstantOp"),
     ("raster/omni_shadow_look_up.comp", "SpecConstantOp"),
+    ("maps/gather.comp", "SpecConstantOp"),
+    ("maps/impostor_search.comp", "SpecConstantOp"),
     ("maps/directional_border.comp", "SpecConstantOp"),
     ("maps/directional_coarser.comp", "SpecConstantOp"),
     ("maps/directional_look_up.comp", "SpecConstantOp"),

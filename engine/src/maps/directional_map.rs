@@ -43,7 +43,7 @@ pub struct DirectionalMap {
 }
 
 /// The number by which kernels know a map; `None` for those that they have no look-ups of.
-fn kind(map: Parametrization) -> Option<u32> {
+pub(super) fn kind(map: Parametrization) -> Option<u32> {
     match map {
         Parametrization::OctahedronQuadratic => Some(DIRECTIONAL_OCTAHEDRON),
         Parametrization::OctahedronRectangular => Some(DIRECTIONAL_OCTAHEDRON_RECTANGULAR),

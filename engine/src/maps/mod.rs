@@ -10,6 +10,8 @@
 //! - [`directional_map`]: levels with borders on the device; [`spherical_sat`], [`box_lobe`] and [`prefilter`]: glossy look-ups;
 //! - [`to_lat_long`]: a latitude–longitude map of one that was drawn;
 //! - [`irradiance`]: what a surface receives;
+//! - [`gather`]: the light of a coarse map's texels at other places than its own;
+//! - [`impostor`]: maps with distances, and what rays meet by them;
 //! - [`packed_direction`]: directions in a word; [`turn`]: the angles that maps take.
 //!
 //! Guarantees: all is exact up to rounding and deterministic; solid angles of texels are closed forms or spherical polygons, cut at the rims
@@ -32,7 +34,9 @@ pub mod cube;
 pub mod directional_map;
 mod disc;
 pub mod equal_area;
+pub mod gather;
 mod image;
+pub mod impostor;
 pub mod irradiance;
 pub mod lat_long;
 pub mod level;

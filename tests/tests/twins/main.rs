@@ -6,6 +6,7 @@
 mod directions;
 mod fresnel_forms;
 mod geometry;
+mod impostors;
 mod light_tree;
 mod lights;
 mod maps;

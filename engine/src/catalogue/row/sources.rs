@@ -21,6 +21,7 @@ sources! {
     ASHKIANI_2016 = "ashkiani-2016": "S. Ashkiani, A. Davidson, U. Meyer, J. Owens", "GPU Multisplit", "PPoPP", 2016;
     BECKMANN_SPIZZICHINO_1963 = "beckmann-spizzichino-1963": "P. Beckmann, A. Spizzichino", "The Scattering of Electromagnetic Waves from Rough Surfaces", "Pergamon Press", 1963;
     BELLMAN_1961 = "bellman-1961": "R. Bellman", "On the Approximation of Curves by Line Segments Using Dynamic Programming", "CACM 4(6)", 1961;
+    BJORKE_2004 = "bjorke-2004": "K. Bjorke", "Image-Based Lighting", "GPU Gems", 2004;
     BLASI_1993 = "blasi-1993": "P. Blasi, B. Le Saëc, C. Schlick", "A Rendering Algorithm for Discrete Volume Density Objects", "CGF 12(3)", 1993;
     BLELLOCH_1990 = "blelloch-1990": "G. Blelloch", "Prefix Sums and Their Applications", "CMU-CS-90-190", 1990;
     BLINN_1977 = "blinn-1977": "J. Blinn", "Models of Light Reflection for Computer Synthesized Pictures", "SIGGRAPH", 1977;
@@ -43,6 +44,7 @@ sources! {
     ENDERTON_2010 = "enderton-2010": "E. Enderton, E. Sintorn, P. Shirley, D. Luebke", "Stochastic Transparency", "I3D", 2010;
     ENGELHARDT_2013 = "engelhardt-2013": "T. Engelhardt", "Efficient From-Point Visibility for Global Illumination in Virtual Scenes with Participating Media", "PhD thesis, KIT", 2013;
     ENGELHARDT_DACHSBACHER_2008 = "engelhardt-dachsbacher-2008": "T. Engelhardt, C. Dachsbacher", "Octahedron Environment Maps", "VMV", 2008;
+    EVERITT_2001 = "everitt-2001": "C. Everitt", "Interactive Order-Independent Transparency", "NVIDIA", 2001;
     FABIANOWSKI_2011 = "fabianowski-2011": "B. Fabianowski", "Interactive Manycore Photon Mapping", "PhD thesis, Trinity College Dublin", 2011;
     FEYNMAN_1964 = "feynman-1964": "R. Feynman, R. Leighton, M. Sands", "The Feynman Lectures on Physics", "Addison-Wesley", 1964;
     FOLEY_SUGERMAN_2005 = "foley-sugerman-2005": "T. Foley, J. Sugerman", "KD-Tree Acceleration Structures for a GPU Raytracer", "Graphics Hardware", 2005;
@@ -93,6 +95,7 @@ sources! {
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;
     KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;
     LAFORTUNE_WILLEMS_1994 = "lafortune-willems-1994": "E. Lafortune, Y. Willems", "Using the Modified Phong Reflectance Model for Physically Based Rendering", "Report CW 197, KU Leuven", 1994;
+    LAGARDE_ZANUTTINI_2012 = "lagarde-zanuttini-2012": "S. Lagarde, A. Zanuttini", "Local Image-based Lighting with Parallax-corrected Cubemaps", "SIGGRAPH Talks", 2012;
     LAINE_2010 = "laine-2010": "S. Laine", "Restart Trail for Stackless BVH Traversal", "HPG", 2010;
     LAINE_2013 = "laine-2013": "S. Laine, T. Karras, T. Aila", "Megakernels Considered Harmful: Wavefront Path Tracing on GPUs", "HPG", 2013;
     LAINE_KARRAS_2011 = "laine-karras-2011": "S. Laine, T. Karras", "Stratified Sampling for Stochastic Transparency", "EGSR", 2011;
@@ -114,6 +117,7 @@ sources! {
     PANTALEONI_LUEBKE_2010 = "pantaleoni-luebke-2010": "J. Pantaleoni, D. Luebke", "HLBVH: Hierarchical LBVH Construction for Real-Time Ray Tracing of Dynamic Geometry", "HPG", 2010;
     PHARR_2016 = "pharr-2016": "M. Pharr, W. Jakob, G. Humphreys", "Physically Based Rendering, 3rd edition", "Morgan Kaufmann", 2016;
     PHARR_2023 = "pharr-2023": "M. Pharr, W. Jakob, G. Humphreys", "Physically Based Rendering, 4th edition", "MIT Press", 2023;
+    POLICARPO_2005 = "policarpo-2005": "F. Policarpo, M. Oliveira, J. Comba", "Real-Time Relief Mapping on Arbitrary Polygonal Surfaces", "I3D", 2005;
     PRAUN_HOPPE_2003 = "praun-hoppe-2003": "E. Praun, H. Hoppe", "Spherical Parametrization and Remeshing", "SIGGRAPH", 2003;
     RAKIC_1995 = "rakic-1995": "A. D. Rakić", "Algorithm for the Determination of Intrinsic Optical Constants of Metal Films: Application to Aluminum", "Appl. Opt. 34", 1995;
     RAMAMOORTHI_HANRAHAN_2001 = "ramamoorthi-hanrahan-2001": "R. Ramamoorthi, P. Hanrahan", "An Efficient Representation for Irradiance Environment Maps", "SIGGRAPH", 2001;
@@ -130,7 +134,11 @@ sources! {
     SILVERMAN_1986 = "silverman-1986": "B. Silverman", "Density Estimation for Statistics and Data Analysis", "Chapman and Hall", 1986;
     SUBR_ARVO_2007 = "subr-arvo-2007": "K. Subr, J. Arvo", "Statistical Hypothesis Testing for Assessing Monte Carlo Estimators", "Pacific Graphics", 2007;
     SUYKENS_WILLEMS_2001 = "suykens-willems-2001": "F. Suykens, Y. Willems", "Path Differentials and Applications", "EGWR", 2001;
+    SZIRMAY_KALOS_2005 = "szirmay-kalos-2005": "L. Szirmay-Kalos, B. Aszódi, I. Lazányi, M. Premecz", "Approximate Ray-Tracing on the GPU with Distance Impostors", "CGF 24(3)", 2005;
+    SZIRMAY_KALOS_2009 = "szirmay-kalos-2009": "L. Szirmay-Kalos, T. Umenhoffer, G. Patow, L. Szécsi, M. Sbert", "Specular Effects on the GPU: State of the Art", "CGF 28(6)", 2009;
+    SZIRMAY_KALOS_LAZANYI_2006 = "szirmay-kalos-lazanyi-2006": "L. Szirmay-Kalos, I. Lazányi", "Indirect Diffuse and Glossy Illumination on the GPU", "SCCG", 2006;
     TURK_1994 = "turk-1994": "G. Turk", "The PLY Polygon File Format", "", 1994;
+    UMENHOFFER_2007 = "umenhoffer-2007": "T. Umenhoffer, G. Patow, L. Szirmay-Kalos", "Robust Multiple Specular Reflections and Refractions", "GPU Gems 3", 2007;
     VEACH_1997 = "veach-1997": "E. Veach", "Robust Monte Carlo Methods for Light Transport Simulation", "PhD thesis, Stanford University", 1997;
     WALD_2003 = "wald-2003": "I. Wald, C. Benthin, P. Slusallek", "Distributed Interactive Ray Tracing of Dynamic Scenes", "PVG", 2003;
     WALD_2004 = "wald-2004": "I. Wald", "Realtime Ray Tracing and Interactive Global Illumination", "PhD thesis, Saarland University", 2004;

@@ -18,6 +18,7 @@
 use glam::{DMat3, UVec2};
 
 use super::method::PreviewSettings;
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::PROBE_LEVELS_MAX;
 use crate::gpu::{
     Access, BufferBarrier, Gpu, Pass, PipelineInfo, Recorder, compute_to_transfer, rw_compute_to_compute,
@@ -284,6 +285,24 @@ impl LightProbe {
         Ok(())
     }
 }
+
+/// Rows of the catalogue.
+pub(super) const ROWS: &[Row] = &[Row {
+    id: "MET-E1",
+    name: "classical environment map: what lies in the ray's own direction",
+    role: Role::PartOf("CL-PREVIEW"),
+    limits: "The same from everywhere: right at the map's place and for what is infinitely far.",
+    sources: &[sources::BLINN_NEWELL_1976.whole(), sources::MILLER_HOFFMAN_1984.whole()],
+    shaders: &["shaders/techniques/preview/probe.glsl"],
+    bias: Some(Bias::Biased("light is taken to come from infinity")),
+    tests: &[
+        "tests/tests/preview/light.rs::a_mirror_sphere_shows_the_environment",
+        "engine/src/maps/impostor/tests/edges.rs::the_classical_look_up_is_the_same_everywhere",
+        "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
+    ],
+    api: &["clerestory::techniques::preview::LightProbe"],
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,169 @@
+//! A room with walls of different radiance and a bright patch on its floor, whose irradiance is known exactly: what gathers are judged by.
+//!
+//! The irradiance of an even polygon is J. H. Lambert's closed form ("Photometria", 1760) of what is above the horizon of the point.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec3, UVec2};
+
+use super::{GatherLights, GatherPoint, SolidAngleForm};
+use crate::Result;
+use crate::maps::impostor::ImpostorImage;
+use crate::maps::impostor::room::BoxRoom;
+use crate::maps::{MapImage, Parametrization};
+
+/// The room \[-1, 1\]³.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LitRoom {
+    /// Radiances of the walls +x, −x, +y, −y, +z and −z.
+    pub walls: [f64; 6],
+    /// Radiance of the patch on the floor −y.
+    pub patch: f64,
+    /// Its middle's x and z, and half its width.
+    pub patch_at: [f64; 3],
+}
+
+/// Radius of the sphere whose points are lit.
+const RADIUS: f64 = 0.15;
+
+impl LitRoom {
+    /// With the radiances of the published figures.
+    pub const PUBLISHED: Self = Self {
+        walls: [1.0, 0.2, 0.8, 0.3, 0.5, 0.1],
+        patch: 20.0,
+        patch_at: [0.5, 0.3, 0.15],
+    };
+    /// The same radiance everywhere.
+    pub const EVEN: Self = Self {
+        walls: [1.0; 6],
+        patch: 1.0,
+        patch_at: [0.5, 0.3, 0.15],
+    };
+
+    /// Places of spheres that were published: the middle, half-way to a wall, near the patch, and a corner.
+    pub const PLACES: [DVec3; 4] = [
+        DVec3::ZERO,
+        DVec3::new(0.5, 0.0, 0.0),
+        DVec3::new(0.5, -0.5, 0.3),
+        DVec3::new(0.8, -0.8, 0.8),
+    ];
+
+    /// Radiance of the wall that is seen in a direction from the middle.
+    pub fn radiance(&self, direction: DVec3) -> f64 {
+        let point = direction / direction.abs().max_element();
+        let axis = point.abs().max_position();
+        let [x, z, half] = self.patch_at;
+        if axis == 1 && point.y < 0.0 && (point.x - x).abs() < half && (point.z - z).abs() < half {
+            return self.patch;
+        }
+        self.walls[2 * axis + usize::from(point[axis] < 0.0)]
+    }
+
+    /// Irradiance of a point in the room about a unit normal, exact.
+    pub fn irradiance(&self, point: &GatherPoint) -> f64 {
+        let mut sum = 0.0;
+        for (i, radiance) in self.walls.into_iter().enumerate() {
+            let axis = i / 2;
+            let [u, v] = [DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]];
+            let middle = if i % 2 == 0 {
+                DVec3::AXES[axis]
+            } else {
+                -DVec3::AXES[axis]
+            };
+            sum += radiance * polygon([middle - u - v, middle + u - v, middle + u + v, middle - u + v], point);
+        }
+        let [x, z, half] = self.patch_at;
+        let corner = |sx: f64, sz: f64| DVec3::new(x + sx * half, -1.0, z + sz * half);
+        let corners = [
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ];
+        sum + (self.patch - self.walls[3]) * polygon(corners, point)
+    }
+
+    /// Points of a sphere at a place of the room, evenly over it.
+    pub fn points(place: DVec3, count: u32) -> Vec<GatherPoint> {
+        let golden = PI * (3.0 - 5f64.sqrt());
+        let point = |i: u32| {
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
+            let (s, c) = (golden * f64::from(i)).sin_cos();
+            let axis = DVec3::new(c, s, 0.0) * (1.0 - z * z).sqrt() + z * DVec3::Z;
+            GatherPoint {
+                position: place + RADIUS * axis,
+                axis,
+            }
+        };
+        (0..count).map(point).collect()
+    }
+
+    /// Radiance and distances of the room in a map of so many texels a side.
+    ///
+    /// # Errors
+    /// As [`MapImage::from_fn`] and [`ImpostorImage::from_fn`].
+    pub fn maps(&self, map: Parametrization, side: u32) -> Result<(MapImage, ImpostorImage)> {
+        let size = UVec2::splat(side);
+        let radiance = MapImage::from_fn(map, size, |texel| {
+            let direction = map.texel_direction(size, texel);
+            DVec3::splat(direction.map_or(0.0, |direction| self.radiance(direction)))
+        })?;
+        let impostor = ImpostorImage::from_fn(map, size, 1, true, |d| BoxRoom::EMPTY.surfaces(d))?;
+        Ok((radiance, impostor))
+    }
+
+    /// The lights of the room in a cube of 256 texels a side, `side` lights a side of a face.
+    ///
+    /// # Errors
+    /// As [`GatherLights::new`].
+    pub fn lights(&self, side: u32, form: SolidAngleForm) -> Result<GatherLights> {
+        let (radiance, impostor) = self.maps(Parametrization::Cube, 256)?;
+        GatherLights::new(&radiance, &impostor, side, form)
+    }
+
+    /// The same as [`GatherLights::as_printed`].
+    ///
+    /// # Errors
+    /// As [`GatherLights::new`].
+    pub fn printed_lights(&self, side: u32, form: SolidAngleForm) -> Result<GatherLights> {
+        let (radiance, impostor) = self.maps(Parametrization::Cube, 256)?;
+        GatherLights::as_printed(&radiance, &impostor, side, form)
+    }
+}
+
+/// RMS of the difference over the mean of what is exact, and the change of the mean, both in %.
+pub fn relative_errors(found: &[f64], exact: &[f64]) -> [f64; 2] {
+    let count = exact.len() as f64;
+    let mean = exact.iter().sum::<f64>() / count;
+    let squares: f64 = found.iter().zip(exact).map(|(a, b)| (a - b) * (a - b)).sum();
+    let bias = found.iter().sum::<f64>() / count / mean - 1.0;
+    [100.0 * (squares / count).sqrt() / mean, 100.0 * bias]
+}
+
+/// ∫ max(0, n·ω) dω over a convex polygon.
+fn polygon(corners: [DVec3; 4], point: &GatherPoint) -> f64 {
+    let n = point.axis;
+    let seen = corners.map(|corner| corner - point.position);
+    // What is above the horizon.
+    let mut above = Vec::with_capacity(6);
+    for i in 0..4 {
+        let (a, b) = (seen[i], seen[(i + 1) % 4]);
+        let (ha, hb) = (n.dot(a), n.dot(b));
+        if ha > 0.0 {
+            above.push(a);
+        }
+        if (ha > 0.0) != (hb > 0.0) {
+            above.push(a + ha / (ha - hb) * (b - a));
+        }
+    }
+    let mut sum = 0.0;
+    for (i, a) in above.iter().enumerate() {
+        let b = above[(i + 1) % above.len()];
+        let cross = a.cross(b);
+        let length = cross.length();
+        if length > 0.0 {
+            sum += length.atan2(a.dot(b)) * n.dot(cross) / length;
+        }
+    }
+    (PI * sum / TAU).abs()
+}

@@ -1,0 +1,106 @@
+//! Reflectivities of lobes as means over cones: the table that lights of any size are looked up in.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec2;
+
+use crate::gpu::shaders::constants::GATHER_TABLE_SIDE;
+use crate::{Error, Result};
+
+/// Rings of a cone, and points of a half ring.
+const RINGS: u32 = 64;
+const POINTS: u32 = 32;
+/// Greatest exponent of a lobe: narrower ones fall between the cosines of the table.
+const MAX_EXPONENT: f64 = 64.0;
+
+/// Means of a normalised lobe over cones, by the cosine of the cone's half angle and that of its axis with the lobe's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reflectivity {
+    exponent: f64,
+    values: Vec<f32>,
+}
+
+/// Mean over a ring, with cosines a + b cos φ, of max(0, cosine)ˢ.
+fn ring(a: f64, b: f64, exponent: f64) -> f64 {
+    if exponent == 1.0 {
+        if a >= b {
+            return a;
+        }
+        if a <= -b {
+            return 0.0;
+        }
+        let edge = (-a / b).acos();
+        return (a * edge + b * edge.sin()) / PI;
+    }
+    let point = |i: u32| {
+        let angle = PI * (f64::from(i) + 0.5) / f64::from(POINTS);
+        (a + b * angle.cos()).max(0.0).powf(exponent)
+    };
+    (0..POINTS).map(point).sum::<f64>() / f64::from(POINTS)
+}
+
+/// Mean of (s + 1)/(2π) max(0, cos)ˢ over the cone whose half angle has the cosine `cone`, 0 to 1, about a direction with the cosine `axis` to the
+/// lobe's.
+pub fn cone_reflectivity(exponent: f64, cone: f64, axis: f64) -> f64 {
+    let norm = (exponent + 1.0) / TAU;
+    let half = cone.clamp(0.0, 1.0).acos();
+    let aside = (1.0 - axis * axis).max(0.0).sqrt();
+    if half < 1e-6 {
+        return norm * axis.max(0.0).powf(exponent);
+    }
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for i in 0..RINGS {
+        let angle = half * (f64::from(i) + 0.5) / f64::from(RINGS);
+        let (s, c) = angle.sin_cos();
+        sum += s * ring(axis * c, aside * s, exponent);
+        whole += s;
+    }
+    norm * sum / whole
+}
+
+impl Reflectivity {
+    /// The table of an exponent.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for an exponent below 1 or above 64, or one that is no number.
+    pub fn new(exponent: f64) -> Result<Self> {
+        if !(1.0..=MAX_EXPONENT).contains(&exponent) {
+            let cause = format!("is not in 1..={MAX_EXPONENT}");
+            return Err(Error::setting("exponent of a gather", exponent, cause));
+        }
+        let side = GATHER_TABLE_SIDE;
+        let last = f64::from(side - 1);
+        let value = |i: u32| {
+            let (cone, axis) = (f64::from(i % side) / last, 2.0 * f64::from(i / side) / last - 1.0);
+            cone_reflectivity(exponent, cone, axis) as f32
+        };
+        Ok(Self {
+            exponent,
+            values: (0..side * side).map(value).collect(),
+        })
+    }
+
+    /// The lobe's exponent.
+    pub fn exponent(&self) -> f64 {
+        self.exponent
+    }
+
+    /// Rows of cosines with the lobe's axis from −1 to 1, each over cosines of half angles from 0 to 1.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The mean over a cone, bilinear in both cosines: twin of `gather_reflectivity`.
+    pub fn at(&self, cone: f64, axis: f64) -> f64 {
+        let side = GATHER_TABLE_SIDE as usize;
+        let last = (side - 1) as f64;
+        let place = last * DVec2::new(cone.clamp(0.0, 1.0), (0.5 * axis + 0.5).clamp(0.0, 1.0));
+        let corner = place.floor().min(DVec2::splat(last - 1.0));
+        let part = place - corner;
+        let first = corner.y as usize * side + corner.x as usize;
+        let at = |i: usize| f64::from(self.values[first + i]);
+        let upper = at(0) + part.x * (at(1) - at(0));
+        let lower = at(side) + part.x * (at(side + 1) - at(side));
+        upper + part.y * (lower - upper)
+    }
+}

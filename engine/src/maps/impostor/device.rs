@@ -1,0 +1,216 @@
+//! An impostor on the device, and batches of rays through it.
+
+use glam::DVec3;
+
+use super::super::Parametrization;
+use super::super::directional_map::kind;
+use super::settings::ImpostorSettings;
+use super::{ImpostorHit, ImpostorImage, ImpostorRay};
+use crate::gpu::shaders::maps::impostor_search as kernel;
+use crate::gpu::shaders::sets::ImpostorSet;
+use crate::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery, ImpostorShape};
+use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::{Error, Result};
+
+/// Distances and normals of an [`ImpostorImage`] in the device's memory: four bytes a texel and layer, and as many again for normals.
+#[derive(Debug)]
+pub struct Impostor {
+    gpu: Gpu,
+    map: Parametrization,
+    kind: u32,
+    layers: u32,
+    shape: Buffer,
+    distances: Buffer,
+    normals: Option<Buffer>,
+}
+
+impl Impostor {
+    /// Uploads an image.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] for one whose distances do not fit a storage buffer's range; [`Error::OutOfMemory`], [`Error::DeviceLost`].
+    pub fn new(gpu: &Gpu, image: &ImpostorImage) -> Result<Self> {
+        let limit = gpu.caps().max_storage_buffer_range;
+        let bytes = size_of_val(image.distances()) as u64;
+        if bytes > limit {
+            return Err(Error::LimitExceeded {
+                name: "impostor: distances".into(),
+                value: bytes,
+                limit_name: "maxStorageBufferRange",
+                limit,
+            });
+        }
+        let shape = ImpostorShape {
+            size: image.size().as_ivec2().to_array(),
+            extent: image.extent(),
+        };
+        let normals = image.normals();
+        let upload = |words: &[u32]| gpu.buffer_with("impostor: normals", Category::Light, words);
+        Ok(Self {
+            gpu: gpu.clone(),
+            map: image.map(),
+            // An image has a map of those that there are.
+            kind: kind(image.map()).unwrap_or_default(),
+            layers: image.layers(),
+            shape: gpu.buffer_with("impostor: shape", Category::Light, &[shape])?,
+            distances: gpu.buffer_with("impostor: distances", Category::Light, image.distances())?,
+            normals: normals.map(upload).transpose()?,
+        })
+    }
+
+    /// Its parametrization.
+    pub fn map(&self) -> Parametrization {
+        self.map
+    }
+
+    /// Layers of surfaces.
+    pub fn layers(&self) -> u32 {
+        self.layers
+    }
+
+    /// Bytes of distances, and of normals.
+    pub fn bytes(&self) -> [u64; 2] {
+        [self.distances.bytes(), self.normals.as_ref().map_or(0, Buffer::bytes)]
+    }
+
+    /// The set that `maps/impostor_set.glsl` reads.
+    pub fn set(&self) -> ImpostorSet<'_> {
+        ImpostorSet {
+            impostor_shapes: self.shape.view(),
+            impostor_distances: self.distances.view(),
+            // Kernels without normals do not read them.
+            impostor_normals: self.normals.as_ref().unwrap_or(&self.distances).view(),
+        }
+    }
+
+    /// What rays meet, in their order: twin [`ImpostorImage::search`].
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for settings out of range, and for a ray that is not finite or has no direction; [`Error::DeviceLost`],
+    /// [`Error::OutOfMemory`].
+    pub fn search(&self, rays: &[ImpostorRay], settings: &ImpostorSettings) -> Result<Vec<ImpostorHit>> {
+        self.search_timed(rays, settings).map(|(hits, _)| hits)
+    }
+
+    /// The same, with the time of the search on the device in seconds.
+    ///
+    /// # Errors
+    /// As [`Impostor::search`].
+    pub fn search_timed(&self, rays: &[ImpostorRay], settings: &ImpostorSettings) -> Result<(Vec<ImpostorHit>, f64)> {
+        let search = ImpostorSearch::new(&self.gpu, self, settings)?;
+        for (i, ray) in rays.iter().enumerate() {
+            if !(ray.origin.is_finite() && ray.direction.is_finite()) {
+                return Err(Error::setting(format!("ray {i}"), format!("{ray:?}"), "is not finite"));
+            }
+            if ray.direction == DVec3::ZERO {
+                return Err(Error::setting(
+                    format!("ray {i}"),
+                    format!("{ray:?}"),
+                    "has no direction",
+                ));
+            }
+        }
+        if rays.is_empty() {
+            return Ok((Vec::new(), 0.0));
+        }
+        let query = |ray: &ImpostorRay| ImpostorQuery {
+            origin: ray.origin.as_vec3().to_array(),
+            direction: ray.direction.as_vec3().to_array(),
+        };
+        let queries: Vec<ImpostorQuery> = rays.iter().map(query).collect();
+        let queries = self.gpu.buffer_with("impostor: rays", Category::Work, &queries)?;
+        let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
+        let hits = self
+            .gpu
+            .buffer(&BufferDesc::storage("impostor: hits", bytes, Category::Work))?;
+        let mut recorder = self.gpu.recorder("impostor")?;
+        recorder.pass("impostor: search", |pass| {
+            search.record(pass, self, queries.view(), hits.view(), rays.len() as u32)
+        })?;
+        let seconds = recorder.submit()?.wait()?.seconds();
+        let hits: Vec<DeviceHit> = self.gpu.read(hits.view(), rays.len())?;
+        let hit = |hit: DeviceHit| ImpostorHit {
+            direction: DVec3::from_array(hit.direction.map(f64::from)),
+            distance: hit.distance.into(),
+            residual: hit.residual.into(),
+            layer: hit.layer,
+        };
+        Ok((hits.into_iter().map(hit).collect(), seconds))
+    }
+}
+
+/// A search on the device: a kernel over rays, specialized by the method, its steps, the map, its layers and whether it has normals.
+#[derive(Debug)]
+pub struct ImpostorSearch {
+    spec: kernel::Spec,
+    tolerance: f32,
+    pipeline: ComputePipeline<kernel::Kernel>,
+}
+
+impl ImpostorSearch {
+    /// Makes the pipeline for impostors as this one.
+    ///
+    /// # Errors
+    /// As [`ImpostorSettings::check`]; [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, impostor: &Impostor, settings: &ImpostorSettings) -> Result<Self> {
+        settings.check(impostor.layers)?;
+        let spec = Self::spec(impostor, settings);
+        Ok(Self {
+            spec,
+            tolerance: settings.tolerance,
+            pipeline: gpu.compute_pipeline(&spec)?,
+        })
+    }
+
+    fn spec(impostor: &Impostor, settings: &ImpostorSettings) -> kernel::Spec {
+        kernel::Spec {
+            directional_kind: impostor.kind,
+            directional_border: 0,
+            impostor_method: settings.method.number(),
+            impostor_steps: settings.steps,
+            impostor_bisections: settings.bisections,
+            impostor_layers: impostor.layers,
+            impostor_planes: impostor.normals.is_some(),
+        }
+    }
+
+    /// The kernel with its specialization.
+    pub fn info(&self) -> PipelineInfo {
+        self.pipeline.info()
+    }
+
+    /// Records the search for `count` rays of the type [`ImpostorQuery`] into hits of the type [`DeviceHit`](crate::gpu::shaders::types::ImpostorHit),
+    /// in the rays' order.
+    ///
+    /// Barriers: the rays must have been made visible to [`Access::COMPUTE`](crate::gpu::Access::COMPUTE), and earlier uses of the hits must have
+    /// ended. After it the hits have been written by a compute shader.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for an impostor of another map, other layers, or with normals where the one before had none; and as [`Pass::dispatch`].
+    pub fn record(
+        &self,
+        pass: &mut Pass<'_>,
+        impostor: &Impostor,
+        rays: BufferView<'_>,
+        hits: BufferView<'_>,
+        count: u32,
+    ) -> Result<()> {
+        let same = impostor.kind == self.spec.directional_kind
+            && impostor.layers == self.spec.impostor_layers
+            && impostor.normals.is_some() == self.spec.impostor_planes;
+        if !same {
+            return Err(Error::setting(
+                "impostor",
+                impostor.map,
+                "differs in map, layers or normals",
+            ));
+        }
+        let set = kernel::Set0 { queries: rays, hits };
+        let push = kernel::Push {
+            count,
+            tolerance: self.tolerance,
+        };
+        let groups = self.pipeline.groups_over(count);
+        pass.dispatch(&self.pipeline, &[&set, &impostor.set()], &push, groups)
+    }
+}

@@ -1,0 +1,224 @@
+//! Distances and normals in the texels of a map, on the host: the twin of what [`Impostor`](super::Impostor) holds on the device.
+
+use glam::{DVec3, UVec2};
+
+use super::super::packed_direction::{pack_octahedral_nearest, unpack_octahedral};
+use super::super::{Parametrization, Texel};
+use crate::gpu::shaders::constants::{IMPOSTOR_LAYERS_MAX, IMPOSTOR_NOTHING, IMPOSTOR_PLANE_BOUND, PACKED_NORMAL_BITS};
+use crate::{Error, Result};
+
+/// A surface that is seen in a direction from the map's place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImpostorSurface {
+    /// Distance from the map's place, above 0.
+    pub distance: f64,
+    /// Normal of any length, to either side.
+    pub normal: DVec3,
+}
+
+/// Distances from the map's place to what lies in the direction of each texel's centre, in one layer or in several, the next surface behind
+/// those of the last layer in each; and, where they are wanted, the normals there.
+///
+/// Distances are f32 and never averaged: a look-up takes the texel that holds the direction. With normals it takes the distance to the plane
+/// through the texel's point, which is exact on planes and off by the square of the texel's width on curved surfaces; without, a texel's
+/// distance holds for all of it. [`NOTHING`](Self::NOTHING) stands where there is no surface, so that no look-up is infinite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImpostorImage {
+    map: Parametrization,
+    size: UVec2,
+    layers: u32,
+    distances: Vec<f32>,
+    normals: Option<Vec<u32>>,
+    nearest: f32,
+    farthest: f32,
+}
+
+/// Refuses maps that impostors do not have, and numbers of layers.
+pub(super) fn check(map: Parametrization, size: UVec2, layers: u32) -> Result<()> {
+    let has_texels = matches!(
+        map,
+        Parametrization::Cube
+            | Parametrization::OctahedronQuadratic
+            | Parametrization::OctahedronRectangular
+            | Parametrization::EqualArea
+            | Parametrization::LatLong
+    );
+    if !has_texels {
+        let cause = "has no impostors; the cube, octahedra with c = 1, and maps of one rectangle have";
+        return Err(Error::setting("map", map, cause));
+    }
+    map.check_size(size)?;
+    if !(1..=IMPOSTOR_LAYERS_MAX).contains(&layers) {
+        let cause = format!("is not in 1..={IMPOSTOR_LAYERS_MAX}");
+        return Err(Error::setting("impostor layers", layers, cause));
+    }
+    Ok(())
+}
+
+/// The distance of a plane in a direction, by that in another one and the cosines of both with its normal; no more than a bound apart, since a
+/// plane seen from aside has any distance within a texel. Where the plane does not lie that way: the distance as it was.
+pub fn impostor_plane(distance: f64, at_centre: f64, at_direction: f64) -> f64 {
+    if at_centre * at_direction > 0.0 {
+        let bound = f64::from(IMPOSTOR_PLANE_BOUND);
+        distance * (at_centre / at_direction).clamp(1.0 / bound, bound)
+    } else {
+        distance
+    }
+}
+
+impl ImpostorImage {
+    /// The distance that stands where there is no surface, in the unit of lengths: finite, so that ratios of it are.
+    pub const NOTHING: f32 = IMPOSTOR_NOTHING;
+
+    /// An impostor of its texels: layer of surfaces by layer, each layer by layer of the map, row by row.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for maps of discs and perspective octahedra, sizes that the map cannot have, no layers or more than eight, numbers of
+    /// texels that do not fit, distances that are not above 0 and finite or lie before those of the last layer, and normals without direction.
+    pub fn new(
+        map: Parametrization,
+        size: UVec2,
+        layers: u32,
+        distances: Vec<f32>,
+        normals: Option<&[DVec3]>,
+    ) -> Result<Self> {
+        check(map, size, layers)?;
+        let of_layer = (size.element_product() * map.layers()) as usize;
+        let wanted = of_layer * layers as usize;
+        for (name, count) in [
+            ("impostor distances", Some(distances.len())),
+            ("impostor normals", normals.map(<[_]>::len)),
+        ] {
+            if let Some(count) = count.filter(|count| *count != wanted) {
+                return Err(Error::setting(name, count, format!("are not {wanted}")));
+            }
+        }
+        let wrong = |i: usize, what: &str, value: String, cause: &str| {
+            Error::setting(format!("impostor {what} of texel {i}"), value, cause)
+        };
+        for (i, distance) in distances.iter().enumerate() {
+            if !(*distance > 0.0 && distance.is_finite()) {
+                return Err(wrong(i, "distance", distance.to_string(), "is not above 0 and finite"));
+            }
+            if i >= of_layer && *distance < distances[i - of_layer] {
+                return Err(wrong(
+                    i,
+                    "distance",
+                    distance.to_string(),
+                    "lies before that of the last layer",
+                ));
+            }
+        }
+        let pack = |normals: &[DVec3]| -> Result<Vec<u32>> {
+            let of = |(i, normal): (usize, &DVec3)| match normal.try_normalize() {
+                Some(n) => Ok(pack_octahedral_nearest(n, PACKED_NORMAL_BITS)),
+                None => Err(wrong(i, "normal", normal.to_string(), "has no direction")),
+            };
+            normals.iter().enumerate().map(of).collect()
+        };
+        let normals = normals.map(pack).transpose()?;
+        let found = distances.iter().copied().filter(|distance| *distance < Self::NOTHING);
+        let (nearest, farthest) = found.fold((Self::NOTHING, 0.0), |(low, high): (f32, f32), distance| {
+            (low.min(distance), high.max(distance))
+        });
+        Ok(Self {
+            map,
+            size,
+            layers,
+            distances,
+            normals,
+            nearest,
+            farthest,
+        })
+    }
+
+    /// An impostor of what lies in each direction, nearest first: with fewer surfaces than layers there is nothing in the others.
+    ///
+    /// # Errors
+    /// As [`ImpostorImage::new`].
+    pub fn from_fn(
+        map: Parametrization,
+        size: UVec2,
+        layers: u32,
+        with_normals: bool,
+        surfaces: impl Fn(DVec3) -> Vec<ImpostorSurface>,
+    ) -> Result<Self> {
+        check(map, size, layers)?;
+        let of_layer = (size.element_product() * map.layers()) as usize;
+        let count = of_layer * layers as usize;
+        let mut distances = vec![Self::NOTHING; count];
+        let mut normals = vec![DVec3::Z; if with_normals { count } else { 0 }];
+        for (i, texel) in map.texels(size).enumerate() {
+            let Some(direction) = map.texel_direction(size, texel) else {
+                continue;
+            };
+            for (layer, surface) in surfaces(direction).into_iter().take(layers as usize).enumerate() {
+                let at = layer * of_layer + i;
+                distances[at] = surface.distance as f32;
+                if let Some(normal) = normals.get_mut(at) {
+                    *normal = surface.normal;
+                }
+            }
+        }
+        Self::new(map, size, layers, distances, with_normals.then_some(normals.as_slice()))
+    }
+
+    /// Its parametrization, in whose axes directions are.
+    pub fn map(&self) -> Parametrization {
+        self.map
+    }
+
+    /// Texels of a layer of the map.
+    pub fn size(&self) -> UVec2 {
+        self.size
+    }
+
+    /// Layers of surfaces.
+    pub fn layers(&self) -> u32 {
+        self.layers
+    }
+
+    /// Layer of surfaces by layer, each layer by layer of the map, row by row.
+    pub fn distances(&self) -> &[f32] {
+        &self.distances
+    }
+
+    /// Normals in the same order, packed by [`pack_octahedral_nearest`] with 16 bits a coordinate.
+    pub fn normals(&self) -> Option<&[u32]> {
+        self.normals.as_deref()
+    }
+
+    /// Least and greatest distance of a surface; [`NOTHING`](Self::NOTHING) and 0 where there is none.
+    pub fn extent(&self) -> [f32; 2] {
+        [self.nearest, self.farthest]
+    }
+
+    /// Distance to the surface of a layer in a direction of any length but 0: twin of `impostor_distance` of `maps/impostor_set.glsl`.
+    pub fn distance(&self, layer: u32, direction: DVec3) -> f64 {
+        let nothing = f64::from(Self::NOTHING);
+        let Some((at, v)) = self.map.encode(direction).zip(direction.try_normalize()) else {
+            return nothing;
+        };
+        let p = (at.uv * self.size.as_dvec2()).as_uvec2().min(self.size - 1);
+        let texel = Texel {
+            layer: at.layer,
+            x: p.x,
+            y: p.y,
+        };
+        let row = (layer * self.map.layers() + texel.layer) * self.size.y + texel.y;
+        let i = (row * self.size.x + texel.x) as usize;
+        let Some(distance) = self
+            .distances
+            .get(i)
+            .copied()
+            .filter(|distance| *distance < Self::NOTHING)
+        else {
+            return nothing;
+        };
+        let plane = self.normals.as_ref().zip(self.map.texel_direction(self.size, texel));
+        plane.map_or(f64::from(distance), |(normals, centre)| {
+            let n = unpack_octahedral(normals[i], PACKED_NORMAL_BITS);
+            impostor_plane(distance.into(), n.dot(centre), n.dot(v))
+        })
+    }
+}

@@ -1,0 +1,178 @@
+// Searches for what a ray meets, by a map that holds distances. Sources, bias and guarantees: maps/impostor/mod.rs; twin:
+// maps/impostor/search.rs. Expects `float impostor_distance(uint layer, vec3 v)`, the distance to a layer's surface in a unit direction.
+#ifndef CLERESTORY_MAPS_IMPOSTOR_GLSL
+#define CLERESTORY_MAPS_IMPOSTOR_GLSL
+
+#include "maps/impostor_step.glsl"
+#include "maps/proxy.glsl"
+
+// What stands where there is no surface: finite, so that ratios of it are.
+const float IMPOSTOR_NOTHING = 1e16;
+// Layers of surfaces at most.
+const uint IMPOSTOR_LAYERS_MAX = 8u;
+// By how much, relatively, a march begins before the least distance and ends behind the greatest: surfaces between texels' centres.
+const float IMPOSTOR_MARGIN = 0.05;
+
+// Methods.
+const uint IMPOSTOR_CLASSICAL = 0u;
+const uint IMPOSTOR_PERPENDICULAR = 1u;
+const uint IMPOSTOR_FIXED_POINT = 2u;
+const uint IMPOSTOR_SECANT_FROM_POINT = 3u;
+const uint IMPOSTOR_SECANT_FROM_GUESS = 4u;
+const uint IMPOSTOR_FALSE_POSITION = 5u;
+const uint IMPOSTOR_MIXED = 6u;
+const uint IMPOSTOR_HYBRID = 7u;
+const uint IMPOSTOR_MARCH = 8u;
+
+layout(constant_id = 130) const uint IMPOSTOR_METHOD = IMPOSTOR_HYBRID;
+// Steps after the first guess; intervals of a march.
+layout(constant_id = 131) const uint IMPOSTOR_STEPS = 3u;
+// Halvings of the interval of a crossing.
+layout(constant_id = 132) const uint IMPOSTOR_BISECTIONS = 12u;
+// Layers of surfaces.
+layout(constant_id = 133) const uint IMPOSTOR_LAYERS = 1u;
+
+// What a search found: the direction from the map's place, the ray's length, |1 - g|, and the surface's layer.
+struct ImpostorHit {
+    vec3 direction;
+    float distance;
+    float residual;
+    uint layer;
+};
+
+// |x + d r| over the distance that the map has there: below 1 in front of the surface.
+float impostor_ratio(uint layer, vec3 x, vec3 r, float d) {
+    vec3 l = x + d * r;
+    float size = length(l);
+    return size > 0.0 ? size / impostor_distance(layer, l / size) : 0.0;
+}
+
+// By secants and brackets; `farthest` is the greatest distance of a surface.
+float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
+    float reach = length(x) + farthest;
+    float far = impostor_distance(layer, r);
+    float across = clamp(far - dot(r, x), 0.0, reach);
+    if (IMPOSTOR_METHOD == IMPOSTOR_PERPENDICULAR) {
+        return across;
+    }
+    float d;
+    if (IMPOSTOR_METHOD == IMPOSTOR_FIXED_POINT) {
+        d = min(sphere_proxy(x, r, far), reach);
+        for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
+            vec3 l = x + d * r;
+            float size = length(l);
+            d = min(sphere_proxy(x, r, size > 0.0 ? impostor_distance(layer, l / size) : far), reach);
+        }
+        return d;
+    }
+    bool is_at_point = IMPOSTOR_METHOD == IMPOSTOR_SECANT_FROM_POINT || IMPOSTOR_METHOD == IMPOSTOR_FALSE_POSITION;
+    float g = 0.0;
+    if (is_at_point || IMPOSTOR_METHOD == IMPOSTOR_HYBRID) {
+        g = impostor_ratio(layer, x, r, 0.0);
+        // A point that the map's place does not see is no bracket.
+        is_at_point = is_at_point || g <= 1.0;
+    }
+    float begin = is_at_point ? 0.0 : across;
+    if (!is_at_point) {
+        g = impostor_ratio(layer, x, r, begin);
+    }
+    vec2 last = vec2(begin, g);
+    // As printed, false position takes its point for one in front.
+    bool has_under = g < 1.0 || is_at_point;
+    bool has_over = !has_under;
+    vec2 under = last;
+    vec2 over = last;
+    d = clamp(begin + impostor_step(last, false, last, far), 0.0, reach);
+    for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
+        vec2 guess = vec2(d, impostor_ratio(layer, x, r, d));
+        vec2 other = last;
+        bool has_other = true;
+        if (IMPOSTOR_METHOD != IMPOSTOR_SECANT_FROM_POINT && IMPOSTOR_METHOD != IMPOSTOR_SECANT_FROM_GUESS) {
+            bool is_under = guess.y < 1.0;
+            has_other = is_under ? has_over : has_under;
+            other = is_under ? over : under;
+            under = is_under ? guess : under;
+            over = is_under ? over : guess;
+            has_under = has_under || is_under;
+            has_over = has_over || !is_under;
+        }
+        last = guess;
+        d = clamp(d + impostor_step(guess, has_other, other, far), 0.0, reach);
+    }
+    return d;
+}
+
+// By even steps to the first crossing of a surface, and bisection; `extent` is the least and the greatest distance of a surface.
+float impostor_by_march(uint layer, vec3 x, vec3 r, vec2 extent, float tolerance) {
+    float begin = length(x) < extent.x ? (1.0 - IMPOSTOR_MARGIN) * sphere_proxy(x, r, extent.x) : 0.0;
+    float end = (1.0 + IMPOSTOR_MARGIN) * sphere_proxy(x, r, extent.y);
+    float interval = max(end - begin, 0.0) / float(IMPOSTOR_STEPS);
+    float low = begin;
+    float g_low = impostor_ratio(layer, x, r, begin);
+    float best = end;
+    float least = IMPOSTOR_NOTHING;
+    bool is_found = false;
+    for (uint i = 0u; i < IMPOSTOR_STEPS && !is_found; ++i) {
+        float high = begin + float(i + 1u) * interval;
+        float g_high = impostor_ratio(layer, x, r, high);
+        bool is_under = g_low < 1.0;
+        if (is_under != (g_high < 1.0)) {
+            float a = low;
+            float b = high;
+            for (uint k = 0u; k < IMPOSTOR_BISECTIONS; ++k) {
+                float middle = 0.5 * (a + b);
+                bool is_before = (impostor_ratio(layer, x, r, middle) < 1.0) == is_under;
+                a = is_before ? middle : a;
+                b = is_before ? b : middle;
+            }
+            float d = 0.5 * (a + b);
+            float residual = abs(1.0 - impostor_ratio(layer, x, r, d));
+            is_found = residual < tolerance;
+            if (residual < least) {
+                best = d;
+                least = residual;
+            }
+        }
+        low = high;
+        g_low = g_high;
+    }
+    // Beyond the farthest surface and in front of what there is: the sky.
+    return !is_found && g_low < 1.0 ? end : best;
+}
+
+// Of the unit direction r.
+ImpostorHit impostor_search(vec3 x, vec3 r, vec2 extent, float tolerance) {
+    ImpostorHit best = ImpostorHit(vec3(0.0), 0.0, 1.0, 0u);
+    bool is_ray = dot(r, r) > 0.0 && !any(isinf(r)) && !any(isnan(x)) && !any(isinf(x));
+    if (!is_ray) {
+        return best;
+    }
+    if (IMPOSTOR_METHOD == IMPOSTOR_CLASSICAL) {
+        return ImpostorHit(r, IMPOSTOR_NOTHING, 1.0, 0u);
+    }
+    bool is_found = false;
+    for (uint layer = 0u; layer < IMPOSTOR_LAYERS; ++layer) {
+        float d = IMPOSTOR_METHOD == IMPOSTOR_MARCH ? impostor_by_march(layer, x, r, extent, tolerance)
+                                                    : impostor_by_steps(layer, x, r, extent.y);
+        vec3 l = x + d * r;
+        float size = length(l);
+        vec3 v = size > 0.0 ? l / size : r;
+        float distance = impostor_distance(layer, v);
+        // 1 at the map's place itself.
+        ImpostorHit hit = ImpostorHit(v, d, abs(1.0 - size / distance), layer);
+        if (size > 0.0 && distance >= IMPOSTOR_NOTHING) {
+            // The sky in the first layer; in others no further surface.
+            hit = ImpostorHit(r, IMPOSTOR_NOTHING, layer == 0u ? 0.0 : 1.0, layer);
+        }
+        bool is_surface = hit.residual < tolerance && hit.distance < IMPOSTOR_NOTHING && hit.distance > 0.0;
+        bool is_better = is_surface ? !is_found || hit.distance < best.distance
+                                    : !is_found && (layer == 0u || hit.residual < best.residual);
+        if (is_better) {
+            best = hit;
+        }
+        is_found = is_found || is_surface;
+    }
+    return best;
+}
+
+#endif

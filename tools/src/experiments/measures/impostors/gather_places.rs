@@ -1,0 +1,149 @@
+//! The light of a room on spheres that move through it: the map at its place beside localised gathers of few and of many texels, by the lights'
+//! middles and by means over their cones.
+//!
+//! Oracle: Lambert's closed form for the room's walls.
+
+use clerestory::Result;
+use clerestory::maps::Parametrization;
+use clerestory::maps::gather::lit_room::{LitRoom, relative_errors};
+use clerestory::maps::gather::{GatherSettings, SolidAngleForm};
+use clerestory::maps::irradiance::IrradianceSource;
+use glam::DVec3;
+
+use super::gather_table::irradiances;
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Study, curves, rows};
+use crate::experiments::measures::Context;
+
+const POINTS: u32 = 400;
+/// Steps from the middle to the wall.
+const STEPS: u32 = 8;
+/// How near the wall the sphere comes: it nearly touches it.
+const LAST: f64 = 0.84;
+
+rows! {
+    /// A way at a place.
+    struct Row = "Irradiance of a sphere on its way to a wall" by [moved, way] {
+        moved: f64 = "moved by (half widths)",
+        way: String = "way",
+        rms: f64 = "RMS (%)",
+        bias: f64 = "bias (%)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const CLASSICAL: &str = "the map at its place";
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::all(
+        "2² texels are ahead of the map at its place: RMS over its, over all places",
+        Bound::AtMost(1.0),
+        |rows: &[&Row]| over(rows, &way(2, SolidAngleForm::Disc, false)),
+    ),
+    Criterion::all(
+        "16² texels with normals are far ahead: RMS over that of the map at its place, over all places",
+        Bound::AtMost(0.25),
+        |rows: &[&Row]| over(rows, &way(16, SolidAngleForm::DiscWithNormals, true)),
+    ),
+    Criterion::all(
+        "next to a wall means over cones are ahead of middles, 4² texels: RMS over theirs",
+        Bound::AtMost(1.0),
+        |rows: &[&Row]| {
+            let at = |way: &str| rows.iter().rev().find(|row| row.way == way).map(|row| row.rms);
+            let [cones, middles] = [true, false].map(|cones| at(&way(4, SolidAngleForm::Disc, cones)));
+            Some(Measured::exact(cones? / middles?))
+        },
+    ),
+];
+
+/// RMS of a way over that of the map at its place, both as sums over places.
+fn over(rows: &[&Row], way: &str) -> Option<Measured> {
+    let sum = |name: &str| {
+        rows.iter()
+            .filter(|row| row.way == name)
+            .map(|row| row.rms)
+            .sum::<f64>()
+    };
+    (!rows.is_empty()).then(|| Measured::exact(sum(way) / sum(CLASSICAL)))
+}
+
+fn way(side: u32, form: SolidAngleForm, cones: bool) -> String {
+    let form = match form {
+        SolidAngleForm::Ratio => "ratio",
+        SolidAngleForm::Disc => "disc",
+        SolidAngleForm::DiscWithNormals => "disc with normals",
+    };
+    format!(
+        "{side}² texels, {form}, {}",
+        if cones { "means over cones" } else { "middles" }
+    )
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let room = LitRoom::PUBLISHED;
+        let (count, steps) = context.pick((POINTS, STEPS), (20, 1));
+        let (radiance, _) = room.maps(Parametrization::Cube, 64)?;
+        let source = IrradianceSource::new(&radiance);
+        let mut ways = Vec::new();
+        for (side, form, cones) in [
+            (2, SolidAngleForm::Disc, false),
+            (2, SolidAngleForm::Disc, true),
+            (4, SolidAngleForm::Disc, false),
+            (4, SolidAngleForm::Disc, true),
+            (16, SolidAngleForm::Disc, true),
+            (16, SolidAngleForm::DiscWithNormals, true),
+        ] {
+            let settings = GatherSettings {
+                form,
+                cones,
+                ..GatherSettings::default()
+            };
+            ways.push((way(side, form, cones), room.lights(side, form)?, settings));
+        }
+        let moves: Vec<f64> = (0..=steps).map(|i| LAST * f64::from(i) / f64::from(steps)).collect();
+        context.each(
+            &moves,
+            |moved| format!("{moved:.2}"),
+            |moved| {
+                let points = LitRoom::points(*moved * DVec3::X, count);
+                let exact: Vec<f64> = points.iter().map(|point| room.irradiance(point)).collect();
+                let row = |way: &str, found: &[f64]| {
+                    let [rms, bias] = relative_errors(found, &exact);
+                    Row {
+                        moved: *moved,
+                        way: way.into(),
+                        rms,
+                        bias,
+                    }
+                };
+                let still: Vec<f64> = points
+                    .iter()
+                    .map(|point| source.irradiance(point.axis).unwrap_or_default().x)
+                    .collect();
+                let mut rows = vec![row(CLASSICAL, &still)];
+                for (name, lights, settings) in &ways {
+                    rows.push(row(name, &irradiances(&gpu, lights, settings, &points)?));
+                }
+                Ok(rows)
+            },
+        )
+    }
+
+    fn findings(&self) -> Findings {
+        let rows: Vec<&Row> = self.iter().collect();
+        Findings::of(self, CRITERIA)
+            .headline(
+                "RMS of 16² texels with normals over that of the map at its place",
+                over(&rows, &way(16, SolidAngleForm::DiscWithNormals, true)),
+            )
+            .note("A sphere of radius 0.15 goes from the middle of the room [−1, 1]³, where its map was made, along +x until it nearly touches the wall.")
+            .curves(
+                "errors",
+                "Errors of irradiance on the way to a wall",
+                Axes::even("moved by (half widths)", "RMS (%)", 60.0, (4, 0.25)),
+                curves(self, |row| row.way.clone(), |row| (row.moved, row.rms.into())),
+            )
+    }
+}
