@@ -13,6 +13,7 @@ use crate::gpu::shaders::techniques::path::{path_camera, path_resolve, path_shad
 use crate::gpu::{Access, Recorder, TexelView};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
+use crate::transport::edge_bound::EdgeBound;
 use crate::walk::{ArrivalStage, Bounce, WalkStages, WaveBuffers, stage_barrier};
 use glam::DVec3;
 
@@ -27,6 +28,7 @@ pub(super) struct EyeStages<'a> {
     pub adaptive: Option<&'a AdaptiveSamples>,
     pub kept: &'a KeptBySlot,
     pub light_tree: Option<&'a TexelView>,
+    pub edge_bound: EdgeBound,
     pub wave: Wave,
     pub arrival: Option<&'a dyn ArrivalStage>,
     /// The last wave, until it has reached the film.
@@ -48,6 +50,7 @@ impl EyeStages<'_> {
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             accepting: settings.path_set.accepting(),
             successors: settings.path_set.successors(),
+            edge_bound: self.edge_bound.value(),
         }
     }
 }
