@@ -4,6 +4,15 @@ use super::*;
 use clerestory::scene::AlphaMode;
 
 const PASSES: u32 = 64;
+/// Eye paths of a pixel and pass.
+const EACH: u32 = 4;
+
+fn several() -> VirtualLightSettings {
+    VirtualLightSettings {
+        samples_per_pass: EACH,
+        ..settings()
+    }
+}
 
 /// No virtual light is nearer than another in a sphere: spikes there are none.
 #[test]
@@ -14,7 +23,7 @@ fn unbounded_lights_agree_with_the_path_tracer_in_a_sphere() {
         add_point(&mut scene, Vec3::new(0.1, 0.2, -0.1), Vec3::ONE);
         let settings = VirtualLightSettings {
             bound: Bound::None,
-            ..settings()
+            ..several()
         };
         let found = passes(gpu, &scene, &settings, PASSES);
         found.expect_same_as("unbounded in a sphere", &traced(gpu, &scene, 1024), 0.0);
@@ -23,8 +32,8 @@ fn unbounded_lights_agree_with_the_path_tracer_in_a_sphere() {
         assert_eq!(counts.walks.emitted, u64::from(8 * PASSES));
         assert_eq!(counts.walks.escaped, 0);
         // Each pixel and pass has had each of its lights once, and none of them is behind another surface.
-        assert_eq!(counts.gather.gathers, u64::from(SIDE * SIDE * PASSES));
-        assert_eq!(counts.gather.connections, u64::from(SIDE * SIDE) * counts.lights);
+        assert_eq!(counts.gather.gathers, u64::from(SIDE * SIDE * PASSES * EACH));
+        assert_eq!(counts.gather.connections, u64::from(SIDE * SIDE * EACH) * counts.lights);
     });
 }
 
@@ -33,15 +42,15 @@ fn compensated_bounds_agree_with_the_path_tracer() {
     with_gpu(|gpu| {
         // Three decades about the bounds that would be chosen, of the one kind in the one scene, of the other in the other.
         for (scene, bound, values) in [
-            (room(), Bound::Geometry, [0.03, 0.3, 3.0, 30.0]),
-            (builtin("builtin:cornell-box"), Bound::Distance, [1.0, 0.1, 0.01, 0.001]),
+            (room(), Bound::Geometry, [0.03, 1.0, 30.0]),
+            (builtin("builtin:cornell-box"), Bound::Distance, [0.3, 0.01, 0.0003]),
         ] {
-            let reference = traced(gpu, &scene, 2048);
+            let reference = traced(gpu, &scene, 4096);
             for bound_value in values {
                 let settings = VirtualLightSettings {
                     bound,
                     bound_value,
-                    ..settings()
+                    ..several()
                 };
                 let found = passes(gpu, &scene, &settings, PASSES);
                 let what = format!("{}, {bound:?} {bound_value}", scene.name);
@@ -95,10 +104,10 @@ fn materials_of_all_kinds_agree_with_the_path_tracer() {
             panes.place(cuboid(name, material, lower, lower + Vec3::new(0.3, 1.2, 0.05)));
         }
         for scene in [metal, panes] {
-            let reference = traced(gpu, &scene, 2048);
+            let reference = traced(gpu, &scene, 4096);
             let settings = VirtualLightSettings {
                 bound: Bound::Geometry,
-                ..settings()
+                ..several()
             };
             passes(gpu, &scene, &settings, PASSES).expect_same_as(&scene.name, &reference, 0.0);
         }

@@ -1,8 +1,8 @@
 //! Virtual point lights against closed forms, exact counts, and the path tracer on equal path sets.
 //!
-//! All pixels of a pass have the same virtual lights, so pixels are correlated and the film's variance says nothing of a mean over the picture. Passes are
-//! independent of each other (PCG, one eye path per pixel and pass): the picture is read after each, and means over it are tested by Student's t over the
-//! passes. Pixels are tested one by one besides, by the z-test with Šidák's correction, which correlation makes stricter than it says, never laxer.
+//! All pixels and eye paths of a pass have the same virtual lights, so the film's variance says nothing of their means. Passes are independent of each other
+//! (PCG): the picture is read after each, variances are those of the passes' values, and means over the picture are tested by Student's t over the passes.
+//! Pixels are tested one by one besides, by the z-test with Šidák's correction, of which correlation between pixels makes false alarms rarer, not more frequent.
 
 mod agreement;
 mod bounds;
@@ -22,7 +22,7 @@ use clerestory_tests::with_gpu;
 use glam::Vec3;
 
 /// Pixels per side.
-const SIDE: u32 = 16;
+const SIDE: u32 = 12;
 const SIZE: [u32; 2] = [SIDE; 2];
 const PATHS: &str = "!L.*S[DG]S*E";
 
@@ -65,7 +65,7 @@ fn advance(renderer: &mut VirtualLights, samples: u32) -> [Vec<f32>; 2] {
     [radiance, layer("variance")]
 }
 
-/// A picture, and the mean over it in each pass, by channel.
+/// A picture, the variance of its values by the passes', and the mean over it in each pass, by channel.
 struct Passes {
     radiance: Vec<f32>,
     variance: Vec<f32>,
@@ -83,22 +83,29 @@ fn passes(gpu: &Gpu, scene: &Scene, settings: &VirtualLightSettings, count: u32)
 }
 
 fn passes_of_size(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &VirtualLightSettings, count: u32) -> Passes {
-    assert_eq!(settings.samples_per_pass, 1);
     let mut renderer = renderer(gpu, scene, size, settings);
+    let n = f64::from(count);
+    let values = 3 * (size[0] * size[1]) as usize;
+    let (mut before, mut squares) = (vec![0.0; values], vec![0.0; values]);
     let mut means = [const { Vec::new() }; 3];
-    let (mut before, mut picture) = ([0.0; 3], [Vec::new(), Vec::new()]);
     for pass in 1..=count {
-        picture = advance(&mut renderer, pass);
+        let [now, _] = advance(&mut renderer, pass * settings.samples_per_pass);
+        let mut of_pass = vec![0.0f32; values];
+        for i in 0..values {
+            let sum = f64::from(now[i]) * f64::from(pass);
+            let value = sum - before[i];
+            before[i] = sum;
+            squares[i] += value * value;
+            of_pass[i] = value as f32;
+        }
         for (channel, means) in means.iter_mut().enumerate() {
-            let sum = mean(&picture[0], channel) * f64::from(pass);
-            means.push(sum - before[channel]);
-            before[channel] = sum;
+            means.push(mean(&of_pass, channel));
         }
     }
-    let [radiance, variance] = picture;
+    let variance = |(sum, squares): (&f64, &f64)| ((squares - sum * sum / n) / (n * (n - 1.0))).max(0.0) as f32;
     Passes {
-        radiance,
-        variance,
+        radiance: before.iter().map(|sum| (sum / n) as f32).collect(),
+        variance: before.iter().zip(&squares).map(variance).collect(),
         means,
         counts: renderer.counts(),
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::gather;
 use super::renderer::VirtualLights;
-use super::settings::{PATHS, VirtualLightSettings};
+use super::settings::VirtualLightSettings;
 use crate::Result;
 use crate::catalogue::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -155,6 +155,8 @@ impl Technique for VirtualLights {
 }
 
 const BIAS: Bias = Bias::Unbiased;
+/// [`PATHS`] as path sets are written.
+const DISPLAYED: &str = "L((.*V)?|(.*[^S])?[DG])S*E";
 
 /// Rows of the catalogue.
 const ROWS: &[Row] = &[
@@ -175,7 +177,7 @@ const ROWS: &[Row] = &[
             "shaders/techniques/photon_mapping/photon_scatter.comp",
             "shaders/walk/",
         ],
-        path_set: Some(PATHS),
+        path_set: Some(DISPLAYED),
         bias: Some(BIAS),
         tests: &[
             "tests/tests/instant_radiosity/agreement.rs::unbounded_lights_agree_with_the_path_tracer_in_a_sphere",
@@ -216,11 +218,12 @@ const ROWS: &[Row] = &[
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::PATHS;
     use super::*;
 
     #[test]
     fn the_path_set_is_that_of_its_expression() {
         assert_eq!(CARD.path_set, PATHS.parse().unwrap());
-        assert_eq!(CARD.path_set.to_string(), PATHS);
+        assert_eq!(CARD.path_set, DISPLAYED.parse().unwrap());
     }
 }

@@ -22,7 +22,7 @@ use crate::walk::{ArrivalStage, Places, RAY_QUOTA, StoppedPlaces, stage_barrier}
 use crate::{Error, Result};
 
 /// Lights that a place takes in one dispatch: enough to be worth looking the surface up again.
-const SOFTWARE_LIGHTS: u32 = 16;
+const SOFTWARE_LIGHTS: u32 = 64;
 const DEVICE_LIGHTS: u32 = 64;
 /// Loop iterations below which a ray is stopped too often: fewer lights share a dispatch then.
 const QUOTA_WANTED: u32 = 256;
