@@ -3,7 +3,7 @@
 use super::*;
 use clerestory::scene::AlphaMode;
 
-const PASSES: u32 = 64;
+const PASSES: u32 = 48;
 /// Eye paths of a pixel and pass.
 const EACH: u32 = 4;
 
@@ -42,12 +42,18 @@ fn compensated_bounds_agree_with_the_path_tracer() {
     with_gpu(|gpu| {
         // Three decades about the bounds that would be chosen, of the one kind in the one scene, of the other in the other.
         for (scene, bound, values) in [
-            (room(), Bound::Geometry, [0.03, 1.0, 30.0]),
-            (builtin("builtin:cornell-box"), Bound::Distance, [0.3, 0.01, 0.0003]),
+            (room(), Bound::Geometry, [(0.03, 8), (1.0, 8), (30.0, 16)]),
+            (
+                builtin("builtin:cornell-box"),
+                Bound::Distance,
+                [(0.5, 8), (0.02, 8), (0.0005, 32)],
+            ),
         ] {
             let reference = traced(gpu, &scene, 4096);
-            for bound_value in values {
+            for (bound_value, walks) in values {
                 let settings = VirtualLightSettings {
+                    // Of looser bounds more lights, each of which is less of a spike.
+                    walks,
                     bound,
                     bound_value,
                     ..several()

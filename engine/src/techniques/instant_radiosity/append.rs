@@ -32,7 +32,7 @@ impl Append for LightAppend {
         self.0.info()
     }
 
-    fn record(
+    fn append(
         &self,
         pass: &mut Pass<'_>,
         bounce: &Bounce<'_>,

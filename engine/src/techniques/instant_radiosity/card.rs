@@ -164,7 +164,7 @@ const ROWS: &[Row] = &[
         id: "SVO-G0",
         name: "technique `vpl`: direct light and mirrors by rays, all else from virtual point lights, new for each pass (instant radiosity)",
         role: Role::Technique,
-        limits: "Refuses scenes with media or unlit surfaces; light off a mirror onto the first rough surface is no part of the picture; biased where a bound is not compensated; all pixels of a pass share its noise. Of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
+        limits: "Refuses scenes with media or unlit surfaces; light off a mirror onto the first rough surface is no part of the picture; biased where a bound is not compensated; all pixels of a pass share its noise; of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
         sources: &[
             sources::KELLER_1997.whole(),
             sources::KOLLIG_KELLER_2006.whole(),

@@ -102,11 +102,11 @@ pub(in crate::techniques) trait Append: Send {
 
     fn pipeline(&self) -> PipelineInfo;
 
-    /// Records it: those that wait become records behind `first` and the wave's earlier ones, as far as there is room for `capacity`.
+    /// Records what makes those that wait into records behind `first` and the wave's earlier ones, as far as there is room for `capacity`.
     ///
     /// # Errors
     /// Those of recording.
-    fn record(
+    fn append(
         &self,
         pass: &mut Pass<'_>,
         bounce: &Bounce<'_>,
@@ -139,7 +139,7 @@ impl Append for PhotonAppend {
         self.0.info()
     }
 
-    fn record(
+    fn append(
         &self,
         pass: &mut Pass<'_>,
         bounce: &Bounce<'_>,
@@ -476,7 +476,7 @@ impl WalkStages for PhotonStages<'_> {
         recorder.pass("photon: append", |pass| {
             let own = kit.wave_set();
             kit.append
-                .record(pass, bounce, &kit.scene, &own, self.first, kit.capacity)?;
+                .append(pass, bounce, &kit.scene, &own, self.first, kit.capacity)?;
             stage_barrier(pass);
             Ok(())
         })
