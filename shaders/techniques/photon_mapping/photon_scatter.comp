@@ -187,9 +187,12 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     // Between lossless surfaces photons end by SURVIVAL_MAX alone. Also ends a photon whose flux is not a number.
     float most = bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
     float survival = min(largest_component(flux) / largest_component(photon.throughput), most);
-    if (!(side.y < survival)) {
+    // Eye paths alone keep a scale of radiance: a photon's number stands there, made uniform again by each roulette.
+    float draw = EVEN_SURVIVAL ? photon.eta_scale : side.y;
+    if (!(draw < survival)) {
         return false;
     }
+    photon.eta_scale = EVEN_SURVIVAL ? draw / survival : 1.0;
     if (HAS_DIFFERENTIALS) {
         if ((scattered.flags & (LOBE_DIFFUSE | LOBE_GLOSSY)) != 0u) {
             // A re-emission takes nothing but the footprint's area along; specular lobes keep what is beyond all bounds.

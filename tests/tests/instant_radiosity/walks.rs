@@ -53,6 +53,51 @@ fn power_falls_by_the_albedo_with_each_bounce() {
     });
 }
 
+/// Keller's walks: of N in a grey room N ρ^k are left after k scatterings, to the last one or so, and with the same mean as by roulette everywhere.
+#[test]
+fn fractional_walks_survive_by_number_and_bring_the_same_power() {
+    with_gpu(|gpu| {
+        let mut grey = builtin("builtin:furnace-box?rho=0.5&emission=0");
+        add_point(&mut grey, Vec3::new(0.1, 0.3, -0.2), Vec3::splat(3.0));
+        let walks = 1 << 12;
+        let of = |scene: &Scene, fractional, pass| {
+            let settings = VirtualLightSettings {
+                walks,
+                fractional,
+                ..settings()
+            };
+            lights(gpu, scene, &settings, pass)
+        };
+        let found = of(&grey, true, 0);
+        for bounce in 0..8 {
+            let left = found.iter().filter(|light| light.bounce == bounce).count() as f64;
+            let expected = f64::from(walks) * 0.5f64.powi(bounce as i32);
+            assert!((left - expected).abs() <= 1.0, "{bounce}: {left} instead of {expected}");
+        }
+        // By roulette some twenty more or less would be left of the second.
+        let second = of(&grey, false, 0).iter().filter(|light| light.bounce == 1).count();
+        assert!(second.abs_diff(1 << 11) > 1, "{second}");
+        // Of walks that survive by where they are: sums over bounces and channels, in passes of their own.
+        let scene = room();
+        let passes =
+            |fractional| -> Vec<Vec<VirtualLight>> { (0..6).map(|pass| of(&scene, fractional, pass)).collect() };
+        let (even, by_roulette) = (passes(true), passes(false));
+        for bounce in 1..4 {
+            for channel in 0..3 {
+                let sums = |passes: &[Vec<VirtualLight>]| -> Vec<f64> {
+                    passes.iter().map(|lights| power(lights, bounce, channel)).collect()
+                };
+                let (even, by_roulette) = (sums(&even), sums(&by_roulette));
+                let n = by_roulette.len() as f64;
+                let mean = by_roulette.iter().sum::<f64>() / n;
+                let variance = by_roulette.iter().map(|sum| (sum - mean).powi(2)).sum::<f64>() / (n * (n - 1.0));
+                let what = format!("bounce {bounce}, channel {channel}");
+                expect_mean_of(&what, &even, mean, variance.sqrt(), 0.0);
+            }
+        }
+    });
+}
+
 #[test]
 fn lights_are_the_same_on_every_run_and_others_in_every_pass() {
     with_gpu(|gpu| {

@@ -196,7 +196,7 @@ const ROWS: &[Row] = &[
     },
     Row {
         id: "MET-V1",
-        name: "virtual lights by random walks: power that arrives, its way and the surface, in records of 64 bytes in a fixed order",
+        name: "virtual lights by random or fractional walks: power that arrives, its way and the surface, in records of 64 bytes in a fixed order",
         role: Role::PartOf("SVO-G0"),
         limits: "Light sources are no virtual lights themselves: their light is direct light, which has shadow rays of its own.",
         sources: &[sources::KELLER_1997.whole(), sources::ENGELHARDT_2013.at("§4.5")],
@@ -208,10 +208,11 @@ const ROWS: &[Row] = &[
         ],
         tests: &[
             "tests/tests/instant_radiosity/walks.rs::power_falls_by_the_albedo_with_each_bounce",
+            "tests/tests/instant_radiosity/walks.rs::fractional_walks_survive_by_number_and_bring_the_same_power",
             "tests/tests/instant_radiosity/walks.rs::lights_are_the_same_on_every_run_and_others_in_every_pass",
             "tests/tests/instant_radiosity/walks.rs::every_kind_of_light_leaves_virtual_lights",
         ],
-        settings: &["walks", "sampler"],
+        settings: &["walks", "fractional", "sampler"],
         ..Row::of("engine/src/techniques/instant_radiosity/append.rs")
     },
 ];

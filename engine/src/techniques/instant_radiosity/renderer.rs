@@ -118,6 +118,7 @@ impl VirtualLights {
                 submission_work: settings.submission_work,
                 follows_footprints: false,
                 tells_caustics: false,
+                even_survival: settings.fractional,
                 stores_lights: true,
                 stored: Stored {
                     first_bounce: 0,

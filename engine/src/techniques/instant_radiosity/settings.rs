@@ -56,6 +56,11 @@ crate::settings! {
         pub compensation: Compensation = Compensation::Rays;
         /// Scatterings of eye paths that go on for the compensation, at most, which leaves a part of the light out; 0 goes on until the weight is zero.
         pub compensation_steps: u32 = 0, in 0..=8, unit "scatterings";
+        /// Ends walks by one number each, evenly spread over a pass, so that as many survive each scattering as albedos say, instead of by a
+        /// roulette at each; changes the noise only.
+        ///
+        /// Source: A. Keller, "Instant Radiosity", SIGGRAPH 1997, whose walks are fractional powers of the albedo times their number.
+        pub fractional: bool = false;
         /// Eye paths per pixel that the same virtual lights light.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.

@@ -207,6 +207,7 @@ impl PhotonSettings {
             submission_work: self.submission_work,
             follows_footprints: self.follows_footprints(),
             tells_caustics: self.final_gather,
+            even_survival: false,
             stores_lights: false,
             stored: self.stored(),
         }

@@ -87,6 +87,8 @@ pub(in crate::techniques) struct PhotonPlan {
     pub follows_footprints: bool,
     /// They know whether they were scattered diffusely.
     pub tells_caustics: bool,
+    /// One number of each photon, evenly spread over a pass, decides how far it comes.
+    pub even_survival: bool,
     /// Deposits are those of virtual lights: of all surfaces that scatter into more than one direction, with the power that arrives.
     pub stores_lights: bool,
     pub stored: Stored,
@@ -197,6 +199,8 @@ pub(in crate::techniques) struct PhotonTracer {
 struct Kit {
     scene: Arc<GpuScene>,
     stored: Stored,
+    /// Of a pass.
+    photons: u32,
     append: Box<dyn Append>,
     emit: ComputePipeline<photon_emit::Kernel>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
@@ -235,6 +239,7 @@ impl PhotonTracer {
             has_punctual_lights: scene.has_punctual_lights(),
             sampler_kind: plan.sampler as u32,
             has_differentials,
+            even_survival: plan.even_survival,
             ..Default::default()
         };
         let scatter = surface_spec!(photon_scatter, scene, {
@@ -245,6 +250,7 @@ impl PhotonTracer {
             has_differentials,
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
+            even_survival: plan.even_survival,
             ..Default::default()
         });
         let wanted = plan.photons.next_multiple_of(WALK_GROUP);
@@ -283,6 +289,7 @@ impl PhotonTracer {
                 emission: scene.emission_choice(gpu)?,
                 scene,
                 stored: plan.stored,
+                photons: plan.photons,
                 append,
             },
             gpu: gpu.clone(),
@@ -430,6 +437,7 @@ impl WalkStages for PhotonStages<'_> {
             radius: 0.5 * (upper - lower).length(),
             scene_upper: upper.to_array(),
             key: self.key,
+            photons: kit.photons,
         };
         recorder.pass("photon: emit", |pass| {
             let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
