@@ -42,6 +42,37 @@ fn pictures_do_not_depend_on_how_lights_are_shared_out() {
     });
 }
 
+/// Pictures of the same walks and eye paths: what is scattered twice at most, and what is scattered more often.
+#[test]
+fn parts_of_the_light_sum_to_the_whole() {
+    with_gpu(|gpu| {
+        let scene = room();
+        let of = |least_bounces, most_bounces| {
+            let settings = VirtualLightSettings {
+                bound: Bound::None,
+                least_bounces,
+                most_bounces,
+                ..settings()
+            };
+            let [radiance, _] = advance(&mut renderer(gpu, &scene, SIZE, &settings), 4);
+            radiance
+        };
+        let (whole, few, many, direct) = (of(0, 0), of(0, 2), of(3, 0), of(0, 1));
+        for ((whole, few), many) in whole.iter().zip(&few).zip(&many) {
+            // Three sums of some hundred lights in f32.
+            assert!(
+                (few + many - whole).abs() <= 1e-4 * whole,
+                "{few} + {many} instead of {whole}"
+            );
+        }
+        let [whole, few, direct] = [&whole, &few, &direct].map(|radiance| mean(radiance, 0));
+        assert!(
+            direct > 0.0 && few > 1.1 * direct && whole > 1.1 * few,
+            "{direct} {few} {whole}"
+        );
+    });
+}
+
 #[test]
 fn scenes_without_lights_or_reflection_have_no_virtual_light() {
     with_gpu(|gpu| {

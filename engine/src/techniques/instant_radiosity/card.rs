@@ -182,6 +182,7 @@ const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/instant_radiosity/agreement.rs::unbounded_lights_agree_with_the_path_tracer_in_a_sphere",
             "tests/tests/instant_radiosity/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
+            "tests/tests/instant_radiosity/edge_cases.rs::parts_of_the_light_sum_to_the_whole",
             "tests/tests/instant_radiosity/edge_cases.rs::scenes_without_lights_or_reflection_have_no_virtual_light",
             "tests/tests/instant_radiosity/edge_cases.rs::what_cannot_be_modelled_is_refused_by_name",
         ],
