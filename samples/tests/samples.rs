@@ -322,11 +322,11 @@ fn the_viewer_goes_through_the_techniques() {
         drawn[1] > 10.0 && drawn[1] < path_traced[1],
         "{drawn:?} {path_traced:?}"
     );
-    // One beside the path tracer and photon mapping, and around.
-    let (_, text) = shown(&[lit, "--keys", "ttt"]);
+    // One beside the path tracer, photon mapping and virtual lights, and around.
+    let (_, text) = shown(&[lit, "--keys", "tttt"]);
     assert!(text.contains("path, "), "{text}");
     // What cannot render the scene is left out.
-    let (_, text) = shown(&["builtin:cornell-box", "--keys", "tt"]);
+    let (_, text) = shown(&["builtin:cornell-box", "--keys", "ttt"]);
     assert!(text.contains("path, "), "{text}");
 }
 

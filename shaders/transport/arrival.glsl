@@ -46,6 +46,12 @@ bool arrival_is_unlit(Arrival a) { return HAS_UNLIT && (a.material.flags & MATER
 // Photons are stored, and looked for, where a diffuse base is seen from outside the body.
 bool arrival_has_diffuse_base(Arrival a) { return bsdf_has_diffuse_base(a.bsdf, a.solid && !a.front); }
 
+// Virtual lights are placed, and gathered from, where anything is scattered into more than one direction.
+bool arrival_has_rough_lobes(Arrival a) {
+    bool microfacets = HAS_METAL || HAS_SPECULAR_LAYER || HAS_TRANSMISSION;
+    return arrival_has_diffuse_base(a) || (microfacets && !bsdf_is_delta(a.bsdf));
+}
+
 // Material of the body that the way was in, or OUTSIDE; `known` is what the path knew: one that begins inside a solid learns it here.
 uint arrival_interior(Arrival a, uint known) { return known == OUTSIDE && a.solid && !a.front ? a.surface.material : known; }
 

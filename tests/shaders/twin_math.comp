@@ -11,6 +11,7 @@ const bool SEPARABLE_MASKING = false;
 #include "accel/sphere.glsl"
 #include "accel/triangle.glsl"
 #include "film/two_float.glsl"
+#include "transport/edge_bound.glsl"
 #include "transport/fresnel.glsl"
 #include "transport/ggx.glsl"
 #include "transport/lights.glsl"
@@ -153,6 +154,14 @@ void main() {
         out3(6u, bands);
         out3(9u, weight);
         out_bits(12u, equi_angular_helps(e, in1(9u), in1(21u)) ? 1u : 0u);
+        break;
+    }
+    case 14u: {  // eight edges under one bound
+        for (uint i = 0u; i < 8u; ++i) {
+            vec3 edge = in3(3u * i);
+            out1(i, geometry_term(edge.x, edge.y, edge.z));
+            out1(8u + i, bounded_share(in_bits(24u), in1(25u), edge.x, edge.y, edge.z));
+        }
         break;
     }
     }

@@ -196,8 +196,13 @@ fn files_that_others_name_are_read_through_one_door() {
     assert!(seen > 150, "{seen} files");
 }
 
-/// Methods that may use another one's code and kernels: photon mapping's eye paths are the path tracer's.
-const METHODS_BESIDE: [[&str; 2]; 1] = [["photon_mapping", "path"]];
+/// Methods that may use another one's code and kernels: photon mapping's eye paths are the path tracer's, as are those that virtual lights light, which walks
+/// leave as photons do.
+const METHODS_BESIDE: [[&str; 2]; 3] = [
+    ["photon_mapping", "path"],
+    ["instant_radiosity", "path"],
+    ["instant_radiosity", "photon_mapping"],
+];
 
 #[test]
 fn methods_do_not_know_each_other() {

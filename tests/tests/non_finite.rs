@@ -60,6 +60,7 @@ fn they_are_counted_by_kind_and_left_out() {
         let aovs = PathSlotSet {
             path_aovs: none,
             path_receivers: none,
+            path_departures: none,
         };
         let spec = path_resolve::Spec { write_aovs: false };
         let kernel = gpu.compute_pipeline::<path_resolve::Kernel>(&spec).unwrap();

@@ -18,7 +18,7 @@ pub(crate) use row::Bias;
 pub use row::{Cite, Role, Row, Source, sources};
 
 /// Prefixes of ids, in the order of the catalogue, each with what its ids follow.
-pub const PREFIXES: [(&str, &str); 6] = [
+pub const PREFIXES: [(&str, &str); 7] = [
     (
         "BG-",
         "background (transport, path tracing, photon mapping, shadow maps, ray indexes) of T. Engelhardt's thesis on visibility from a point, 2013",
@@ -39,7 +39,11 @@ pub const PREFIXES: [(&str, &str); 6] = [
     ),
     (
         "MET-",
-        "a doctoral thesis on metals and reflections on graphics hardware: MET-B basics of scattering, MET-F Fresnel terms",
+        "a doctoral thesis on metals and reflections on graphics hardware: MET-B basics of scattering, MET-F Fresnel terms, MET-V virtual lights",
+    ),
+    (
+        "SVO-",
+        "C. Sun's thesis \"Many-Light Real-Time Global Illumination using Sparse Voxel Octree\", 2015: SVO-G methods that it surveys",
     ),
     ("CL-", "the engine's own, and methods published elsewhere"),
 ];

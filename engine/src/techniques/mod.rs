@@ -37,6 +37,7 @@ methods! {
     photon_mapping,
     preview,
     ambient,
+    instant_radiosity,
 }
 
 use std::collections::BTreeMap;

@@ -5,6 +5,7 @@ pub mod bsdf;
 pub mod choice;
 pub mod differentials;
 pub mod distribution;
+pub mod edge_bound;
 pub mod environment;
 pub mod free_flight;
 pub mod fresnel;

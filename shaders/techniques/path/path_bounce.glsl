@@ -17,6 +17,7 @@ layout(push_constant, scalar) uniform Push {
     uint surrounding;       // index of the medium outside all bodies, or NO_MEDIUM
     uint accepting;         // states of the automaton in which light counts, a bit each
     uint successors[15];    // of each state
+    float edge_bound;       // of EDGE_BOUND, beyond which paths have the light of an edge
 } push;
 
 // Whether a path that has been scattered goes on, by a number in [0, 1); weights it if it does.

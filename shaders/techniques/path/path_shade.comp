@@ -14,12 +14,16 @@ layout(local_size_x = 64) in;
 #include "techniques/path/path_slots.glsl"
 #include "transport/arrival.glsl"
 #include "transport/bsdf_label.glsl"
+#include "transport/edge_bound.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/path_set.glsl"
 #include "techniques/path/path_bounce.glsl"
 #include "walk/hand_on.glsl"
 
 #include "walk/draws.glsl"
+
+// Other means have the light of edges between two rough scatterings up to this bound; paths have what it leaves out.
+layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
 
 // Least cosine by which the offset of a ray's origin counts as a way through a medium.
 const float LEAD_COS_MIN = 1.0 / 16.0;
@@ -95,6 +99,15 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         mask = path_set_lobes_to(successors, PATH_SET_LIVE);
         lit_mask = path_set_lobes_to(successors, push.accepting);
     }
+    // What is scattered here by other lobes than mirrors, of light that came over an edge whose other end scattered by such, is shared.
+    float share = 1.0;
+    if (EDGE_BOUND != EDGE_UNBOUNDED && path.pdf > 0.0) {
+        float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? path_departures[slot] : 1.0;
+        float cos_here = abs(dot(path.direction, s.geometric_normal));
+        share = 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, hit.t * hit.t);
+        mask &= share > 0.0 ? LOBE_ALL : LOBE_SPECULAR;
+        lit_mask &= mask;
+    }
     bool ends = arrival_is_unlit(a) || !path_set_continues(push.path_set, path.bounce);
     ends = ends || (HAS_PATH_AUTOMATON && mask == 0u);
     if (ends) {
@@ -129,7 +142,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
                     shadow_segment(s.point, s.geometric_normal, light.point, light.normal, start, ray_to_light.direction);
                 }
                 ray_to_light.origin = start;
-                ray_to_light.contribution = path.throughput * light.radiance * f.rgb * weight;
+                ray_to_light.contribution = path.throughput * light.radiance * f.rgb * (weight * share);
                 uint passed = a.solid ? (dot(wi, frame.outward) < 0.0 ? s.material : around) : interior;
                 if (!HAS_MEDIA && !light.infinite) {
                     float way = distance(s.point.position, light.point.position);
@@ -152,6 +165,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     }
     vec3 wi = frame_to_world(frame, scattered.wi);
     path.throughput *= scattered.weight;
+    if (EDGE_BOUND != EDGE_UNBOUNDED && scattered.pdf > 0.0) {
+        path.throughput *= share;
+    }
     if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi) || path.throughput == vec3(0.0)) {
         return;
     }
@@ -169,6 +185,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     path.pdf = scattered.pdf;
     if (HAS_LIGHT_TREE) {
         path_receivers[slot] = receiver;
+    }
+    if (EDGE_BOUND == EDGE_GEOMETRY) {
+        path_departures[slot] = abs(dot(path.direction, s.geometric_normal));
     }
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);

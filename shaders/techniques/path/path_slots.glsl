@@ -17,5 +17,7 @@ layout(set = 1, binding = 0, scalar) restrict buffer PathAovs { PathAov path_aov
 // For which lights would have been chosen there; where that does not depend on the place, some other buffer is bound, and nothing may be read or
 // written.
 layout(set = 1, binding = 1, scalar) restrict buffer PathReceivers { LightReceiver path_receivers[]; };
+// Cosine to the geometric normal under which a path left where it was scattered last, where edges are bounded by their geometry term; elsewhere as above.
+layout(set = 1, binding = 2, scalar) restrict buffer PathDepartures { float path_departures[]; };
 
 #endif

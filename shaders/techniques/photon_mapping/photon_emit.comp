@@ -22,6 +22,7 @@ layout(push_constant, scalar) uniform Push {
     float radius;  // of the scene's bounding sphere
     vec3 scene_upper;
     WalkKey key;   // the sequence is the pass, places in it photons
+    uint photons;  // of the pass
 } push;
 
 #include "walk/draws.glsl"
@@ -113,6 +114,12 @@ Emission emit(uint slot, out float probability) {
     return e;
 }
 
+// The photon's number among those of its pass that are evenly spread, all by the same offset.
+float even_survival(uint slot) {
+    uint offset = pcg4d(uvec4(walk_sequence(slot), push.photons, SEQUENCE_KEY, push.key.seed)).x;
+    return (float(walk_index(slot)) + unit_float(offset)) / float(push.photons);
+}
+
 void main() {
     uint slot = gl_GlobalInvocationID.x;
     if (slot >= push.key.indices) {
@@ -121,7 +128,8 @@ void main() {
     float probability;
     Emission e = emit(slot, probability);
     uint bounce = path_set_joined(0u, PHOTON_UNDIFFUSED);
-    walk_states_out[slot] = WalkState(e.origin, 1.0, normalize(e.direction), bounce, e.flux, 0.0);
+    float survival = EVEN_SURVIVAL ? even_survival(slot) : 1.0;
+    walk_states_out[slot] = WalkState(e.origin, survival, normalize(e.direction), bounce, e.flux, 0.0);
     walk_gathered[slot] = GatheredLight(vec3(0.0), OUTSIDE);
     if (HAS_DIFFERENTIALS) {
         // Only so many photons are of this light.

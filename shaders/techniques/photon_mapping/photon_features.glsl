@@ -4,5 +4,8 @@
 
 layout(constant_id = 40) const bool HAS_DIFFERENTIALS = true;  // kernels follow the photons' footprints
 layout(constant_id = 41) const bool TELLS_CAUSTICS = false;    // whether a photon was scattered diffusely matters
+// One number of each photon decides all of its roulettes; those of a pass are spread evenly, so that as many survive as probabilities say (Keller 1997).
+layout(constant_id = 49) const bool EVEN_SURVIVAL = false;
+layout(constant_id = 48) const bool STORES_LIGHTS = false;     // deposits become virtual lights
 
 #endif

@@ -1,7 +1,8 @@
 #version 460
 // Where photons have arrived: what is stored of them, and where they go on.
 //
-// Diffuse surfaces keep a deposit of each photon that has been scattered as often as asked for. A photon goes on with the probability that
+// Diffuse surfaces keep a deposit of each photon that has been scattered as often as asked for; for virtual lights (STORES_LIGHTS) all surfaces do
+// that scatter into more than one direction, and what is kept is where the photon is and what it brings. A photon goes on with the probability that
 // leaves its largest band as it is. Scattering functions are those of power (BSDF_IMPORTANCE), and where normals are interpolated the ratio
 // of cosines makes up for it (Veach 1997, 5.3.2), except for what adapt_shading_normal bends.
 //
@@ -12,6 +13,7 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
+#include "techniques/photon_mapping/adjoint_ratio.glsl"
 #include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_wave.glsl"
 #include "transport/arrival.glsl"
@@ -35,12 +37,6 @@ const float KERNEL_RESOLUTION = 4.0;
 // From this bounce on no photon is sure to go on.
 const uint CAPPED_BOUNCE = 8u;
 const float SURVIVAL_MAX = 0.95;
-
-// The ratio by which power that leaves for wi falls short of what interpolated normals make of radiance.
-float adjoint_ratio(vec3 normal, vec3 geometric_normal, vec3 wo, vec3 wi) {
-    float shown = abs(dot(wo, geometric_normal) * dot(wi, normal));
-    return shown > 0.0 ? abs(dot(wo, normal) * dot(wi, geometric_normal)) / shown : 0.0;
-}
 
 // Steps of a band in a record, over the power of two below the largest band (packing.glsl).
 const float FLUX_STEP_SHARE = 1.0 / 256.0;
@@ -81,6 +77,15 @@ void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 n
     pack_photon(PhotonRecord(point.position, normal, photon.direction, flux, kernel), q0, q1, q2);
     add_history(path_set_bounce(photon.bounce), path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
     store_waiting(place, q0, q1, q2);
+    flags |= FLAG_WAITING;
+}
+
+// What a virtual light is made of (techniques/instant_radiosity/virtual_light.glsl): power that arrives, unrounded, since it is not averaged over
+// neighbours.
+void deposit_light(uint place, WalkState photon, Hit hit, uint bounce, inout uint flags) {
+    atomicAdd(photon_counters.deposits, 1u);
+    store_waiting(place, uvec4(floatBitsToUint(hit.barycentrics), hit.triangle, bounce), uvec4(floatBitsToUint(photon.throughput), 0u),
+                  uvec4(floatBitsToUint(photon.direction), 0u));
     flags |= FLAG_WAITING;
 }
 
@@ -149,13 +154,18 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     if (HAS_DIFFERENTIALS) {
         footprint = transfer_differentials(photon_differentials[slot], hit.t, photon.direction, s.geometric_normal);
     }
-    if (bounce >= push.first_deposit && arrival_has_diffuse_base(a)) {
+    bool deposits = STORES_LIGHTS ? arrival_has_rough_lobes(a) : arrival_has_diffuse_base(a);
+    if (bounce >= push.first_deposit && deposits) {
         WalkState landed = photon;
         if (HAS_ALPHA) {
             // Blended surfaces stop only that share of photons, but whoever meets them sees all of their light.
             landed.throughput /= material_coverage(a.material, surface_base_color(a.material, s).a);
         }
-        deposit(slot, place, landed, s.point, a.facing, footprint, flags);
+        if (STORES_LIGHTS) {
+            deposit_light(place, photon, hit, bounce, flags);
+        } else {
+            deposit(slot, place, landed, s.point, a.facing, footprint, flags);
+        }
     }
     if (bounce >= push.last_bounce) {
         return false;
@@ -177,9 +187,12 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     // Between lossless surfaces photons end by SURVIVAL_MAX alone. Also ends a photon whose flux is not a number.
     float most = bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
     float survival = min(largest_component(flux) / largest_component(photon.throughput), most);
-    if (!(side.y < survival)) {
+    // Eye paths alone keep a scale of radiance: a photon's number stands there, made uniform again by each roulette.
+    float draw = EVEN_SURVIVAL ? photon.eta_scale : side.y;
+    if (!(draw < survival)) {
         return false;
     }
+    photon.eta_scale = EVEN_SURVIVAL ? draw / survival : 1.0;
     if (HAS_DIFFERENTIALS) {
         if ((scattered.flags & (LOBE_DIFFUSE | LOBE_GLOSSY)) != 0u) {
             // A re-emission takes nothing but the footprint's area along; specular lobes keep what is beyond all bounds.

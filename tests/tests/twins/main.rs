@@ -4,6 +4,7 @@
 //! f32 operations on the way; a device whose operations round as they should stays well below.
 
 mod directions;
+mod edges;
 mod fresnel_forms;
 mod geometry;
 mod impostors;

@@ -83,6 +83,7 @@ sources! {
     KAUTZ_2000 = "kautz-2000": "J. Kautz, P.-P. Vázquez, W. Heidrich, H.-P. Seidel", "A Unified Approach to Prefiltered Environment Maps", "EGWR", 2000;
     KAY_KAJIYA_1986 = "kay-kajiya-1986": "T. Kay, J. Kajiya", "Ray Tracing Complex Scenes", "SIGGRAPH", 1986;
     KELEMEN_SZIRMAY_KALOS_2001 = "kelemen-szirmay-kalos-2001": "C. Kelemen, L. Szirmay-Kalos", "A Microfacet Based Coupled Specular-Matte BRDF Model", "Eurographics short papers", 2001;
+    KELLER_1997 = "keller-1997": "A. Keller", "Instant Radiosity", "SIGGRAPH", 1997;
     KHRONOS_GLTF = "khronos-gltf": "Khronos", "glTF 2.0 Specification", "", 0;
     KHRONOS_LIGHTS_PUNCTUAL = "khronos-lights-punctual": "Khronos", "KHR_lights_punctual", "glTF extension", 0;
     KHRONOS_MATERIALS_VOLUME = "khronos-materials-volume": "Khronos", "KHR_materials_volume", "glTF extension", 0;
@@ -91,6 +92,7 @@ sources! {
     KHRONOS_VULKAN = "khronos-vulkan": "Khronos", "Vulkan 1.3 Specification", "", 0;
     KIRK_ARVO_1991 = "kirk-arvo-1991": "D. Kirk, J. Arvo", "Unbiased Sampling Techniques for Image Synthesis", "SIGGRAPH", 1991;
     KNAUS_ZWICKER_2011 = "knaus-zwicker-2011": "C. Knaus, M. Zwicker", "Progressive Photon Mapping: A Probabilistic Approach", "ACM TOG 30(3)", 2011;
+    KOLLIG_KELLER_2006 = "kollig-keller-2006": "T. Kollig, A. Keller", "Illumination in the Presence of Weak Singularities", "Monte Carlo and Quasi-Monte Carlo Methods 2004", 2006;
     KULLA_CONTY_2017 = "kulla-conty-2017": "C. Kulla, A. Conty", "Revisiting Physically Based Shading at Imageworks", "SIGGRAPH course notes", 2017;
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;
     KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;
@@ -133,6 +135,7 @@ sources! {
     SIDAK_1967 = "sidak-1967": "Z. Šidák", "Rectangular Confidence Regions for the Means of Multivariate Normal Distributions", "JASA 62", 1967;
     SILVERMAN_1986 = "silverman-1986": "B. Silverman", "Density Estimation for Statistics and Data Analysis", "Chapman and Hall", 1986;
     SUBR_ARVO_2007 = "subr-arvo-2007": "K. Subr, J. Arvo", "Statistical Hypothesis Testing for Assessing Monte Carlo Estimators", "Pacific Graphics", 2007;
+    SUN_2015 = "sun-2015": "C. Sun", "Many-Light Real-Time Global Illumination using Sparse Voxel Octree", "Master's thesis, Worcester Polytechnic Institute", 2015;
     SUYKENS_WILLEMS_2001 = "suykens-willems-2001": "F. Suykens, Y. Willems", "Path Differentials and Applications", "EGWR", 2001;
     SZIRMAY_KALOS_2005 = "szirmay-kalos-2005": "L. Szirmay-Kalos, B. Aszódi, I. Lazányi, M. Premecz", "Approximate Ray-Tracing on the GPU with Distance Impostors", "CGF 24(3)", 2005;
     SZIRMAY_KALOS_2009 = "szirmay-kalos-2009": "L. Szirmay-Kalos, T. Umenhoffer, G. Patow, L. Szécsi, M. Sbert", "Specular Effects on the GPU: State of the Art", "CGF 28(6)", 2009;

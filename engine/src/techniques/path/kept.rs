@@ -10,26 +10,36 @@ pub(super) struct KeptBySlot {
     aovs: Buffer,
     /// Where paths were scattered last, where the choice of lights depends on it.
     receivers: Option<Buffer>,
+    /// Under which cosine they left there, where edges are bounded by their geometry term.
+    departures: Option<Buffer>,
 }
 
 impl KeptBySlot {
-    pub fn new(gpu: &Gpu, slots: u32, has_aovs: bool, has_receivers: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, slots: u32, has_aovs: bool, has_receivers: bool, has_departures: bool) -> Result<Self> {
         let work = |name, bytes: usize, slots: u32| {
             let bytes = bytes as u64 * u64::from(slots);
             gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work))
         };
         let receivers = || work("path receivers", size_of::<LightReceiver>(), slots);
+        let departures = || work("path departures", size_of::<f32>(), slots);
         Ok(Self {
             aovs: work("path aovs", size_of::<PathAov>(), if has_aovs { slots } else { 0 })?,
             receivers: has_receivers.then(receivers).transpose()?,
+            departures: has_departures.then(departures).transpose()?,
         })
     }
 
-    /// Set 1. Without receivers another buffer stands in their place.
+    /// Set 1. Without receivers or departures another buffer stands in their place.
     pub fn set(&self) -> PathSlotSet<'_> {
         PathSlotSet {
             path_aovs: self.aovs.view(),
             path_receivers: self.receivers.as_ref().unwrap_or(&self.aovs).view(),
+            path_departures: self.departures().view(),
         }
+    }
+
+    /// Cosines at departure, or some other buffer.
+    pub fn departures(&self) -> &Buffer {
+        self.departures.as_ref().unwrap_or(&self.aovs)
     }
 }

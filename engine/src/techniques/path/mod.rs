@@ -46,6 +46,7 @@ use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
 use crate::settings::TypedSettings;
 use crate::transport::GpuScene;
+use crate::transport::edge_bound::EdgeBound;
 use crate::walk::{
     ArrivalStage, Fetches, Turnover, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
     slots_of_device,
@@ -110,6 +111,8 @@ pub struct PathTracer {
     gpu: Gpu,
     scene: Arc<GpuScene>,
     settings: PathTracerSettings,
+    /// Up to which other means have the light of edges between two scatterings.
+    edge_bound: EdgeBound,
     frame: CameraFrame,
     /// Where the camera is, for the medium around it.
     eye: DVec3,
@@ -151,6 +154,19 @@ impl PathTracer {
         size: [u32; 2],
         settings: PathTracerSettings,
     ) -> Result<Self> {
+        Self::beyond(gpu, scene, camera, size, settings, EdgeBound::Unbounded)
+    }
+
+    /// As [`PathTracer::new`], for pictures in which an [`ArrivalStage`] brings the light of edges between two scatterings that are no mirrors', up to a bound: paths
+    /// have what it leaves out, and with [`EdgeBound::Unbounded`] all that their path set has.
+    pub(crate) fn beyond(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: PathTracerSettings,
+        edge_bound: EdgeBound,
+    ) -> Result<Self> {
         settings.check()?;
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let full_wave = settings.keeps_waves_full();
@@ -170,7 +186,7 @@ impl PathTracer {
         } else {
             None
         };
-        let pipelines = Pipelines::new(gpu, &scene, &settings, light_tree.is_some(), &frame, camera)?;
+        let pipelines = Pipelines::new(gpu, &scene, &settings, light_tree.is_some(), edge_bound, &frame, camera)?;
         let has_media = scene.profile().media.any();
         let needs = WaveNeeds {
             waiting: scene.has_lights(),
@@ -183,7 +199,8 @@ impl PathTracer {
         let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
         let adaptive = settings.adaptive != Adaptive::Off;
         let more = |slots| {
-            let kept = KeptBySlot::new(gpu, slots, film.has_aovs(), light_tree.is_some())?;
+            let has_departures = matches!(edge_bound, EdgeBound::Geometry(_));
+            let kept = KeptBySlot::new(gpu, slots, film.has_aovs(), light_tree.is_some(), has_departures)?;
             let adaptive_numbers = || {
                 let format = vk::Format::R32G32_UINT;
                 gpu.storage_texels("path numbers", Category::Work, format, slots.into())
@@ -225,6 +242,7 @@ impl PathTracer {
             gpu: gpu.clone(),
             scene,
             settings,
+            edge_bound,
             frame,
             eye: camera.transform.translation,
             pipelines,
@@ -371,6 +389,11 @@ impl PathTracer {
         self.walker.buffers().slots()
     }
 
+    /// By slot the cosine under which a path left where it was scattered last, where edges are bounded by their geometry term; elsewhere some other buffer.
+    pub(crate) fn departures(&self) -> Buffer {
+        self.kept.departures().clone()
+    }
+
     /// Whether a wave is under way between two steps.
     pub(crate) fn is_within_wave(&self) -> bool {
         self.in_flight.is_some()
@@ -438,6 +461,7 @@ impl PathTracer {
             adaptive: self.adaptive.as_ref(),
             kept: &self.kept,
             light_tree: self.light_tree.as_ref(),
+            edge_bound: self.edge_bound,
             arrival,
             under_way: UnderWay::Whole {
                 wave: *wave,

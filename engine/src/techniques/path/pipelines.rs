@@ -6,6 +6,7 @@ use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_refil
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
+use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, surface_spec};
 
 /// One kernel a stage of its own.
@@ -66,6 +67,7 @@ impl Pipelines {
         scene: &GpuScene,
         settings: &PathTracerSettings,
         has_light_tree: bool,
+        edge_bound: EdgeBound,
         frame: &CameraFrame,
         camera: &Camera,
     ) -> Result<Self> {
@@ -86,6 +88,7 @@ impl Pipelines {
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
             count_fetches: settings.count_fetches,
+            edge_bound: edge_bound.kind(),
         });
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.

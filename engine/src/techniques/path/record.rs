@@ -16,6 +16,7 @@ use crate::gpu::shaders::types::CameraView;
 use crate::gpu::{Access, ComputePipeline, Pass, Recorder, TexelView};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
+use crate::transport::edge_bound::EdgeBound;
 use crate::walk::{ArrivalStage, Bounce, Refill, WalkKey, WalkStages, WaveBuffers, stage_barrier};
 use glam::DVec3;
 
@@ -30,6 +31,7 @@ pub(super) struct EyeStages<'a> {
     pub adaptive: Option<&'a AdaptiveSamples>,
     pub kept: &'a KeptBySlot,
     pub light_tree: Option<&'a TexelView>,
+    pub edge_bound: EdgeBound,
     pub arrival: Option<&'a dyn ArrivalStage>,
     pub under_way: UnderWay<'a>,
 }
@@ -89,6 +91,7 @@ impl EyeStages<'_> {
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             accepting: settings.path_set.accepting(),
             successors: settings.path_set.successors(),
+            edge_bound: self.edge_bound.value(),
         }
     }
 }

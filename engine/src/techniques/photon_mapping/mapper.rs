@@ -22,7 +22,7 @@ use super::gather::{Gather, GatherCounts};
 use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
 use super::settings::{MapBuild, PhotonSettings};
-use super::tracer::{PhotonCounts, PhotonTracer, Tracing, flux_scale};
+use super::tracer::{PhotonAppend, PhotonCounts, PhotonTracer, Tracing, flux_scale};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
@@ -130,7 +130,10 @@ impl PhotonMapper {
             ..PathTracerSettings::default()
         };
         let has_map = settings.needs_photons() && scene.has_lights();
-        let tracer = has_map.then(|| PhotonTracer::new(gpu, Arc::clone(&scene), &settings, settings.stored()));
+        let tracer = has_map.then(|| {
+            let append = Box::new(PhotonAppend::new(gpu)?);
+            PhotonTracer::new(gpu, Arc::clone(&scene), settings.plan(), append)
+        });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
         let eye = PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?;
@@ -244,7 +247,7 @@ impl PhotonMapper {
         {
             let clock = Instant::now();
             let begun = photons.tracing.take();
-            let mut tracing = begun.unwrap_or_else(|| photons.tracer.begin(pass, &kernel));
+            let mut tracing = begun.unwrap_or_else(|| photons.tracer.begin(pass, Some(&kernel)));
             let all = photons.tracer.advance(&mut tracing)?;
             timings.append(&mut tracing.take_timings());
             self.counts.trace_seconds += clock.elapsed().as_secs_f64();
@@ -320,7 +323,7 @@ impl PhotonMapper {
             return Ok(Vec::new());
         };
         photons.tracing = None;
-        let traced = photons.tracer.trace(pass, &kernel)?;
+        let traced = photons.tracer.trace(pass, Some(&kernel))?;
         self.counts.photons += traced.counts;
         let records = photons.tracer.records().buffer().view();
         let records: Vec<PhotonWords> = self.gpu.read(records, traced.records as usize)?;
@@ -348,7 +351,7 @@ impl PhotonMapper {
             return Ok(None);
         };
         photons.tracing = None;
-        let traced = photons.tracer.trace(pass, &kernel)?;
+        let traced = photons.tracer.trace(pass, Some(&kernel))?;
         self.counts.photons += traced.counts;
         let (records, area) = (photons.tracer.records(), self.scene.surface_area());
         let mut maker = MapMaker::new(&self.gpu, build)?;

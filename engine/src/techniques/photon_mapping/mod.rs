@@ -17,3 +17,4 @@ pub use map::{MapContents, map_contents};
 pub use mapper::{MappedPhoton, MapperCounts, PhotonMapper};
 pub use settings::{MapBuild, MapQuery, MapQueue, PhotonSettings};
 pub use tracer::PhotonCounts;
+pub(super) use tracer::{Append, PhotonPlan, PhotonTracer, Stored, Tracing};

@@ -1,7 +1,7 @@
 //! Settings of photon mapping, and the path sets of its two parts.
 
 use super::kernel::{KernelProfile, KernelSettings, KernelShape};
-use super::tracer::Stored;
+use super::tracer::{PhotonPlan, Stored};
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
 use crate::techniques::path::SAMPLES_PER_WAVE;
@@ -197,6 +197,21 @@ impl PhotonSettings {
             length_max: length_max / unit_length * shrunk,
             flatness: f64::from(self.flatness),
             widens_flat: self.widen_flat,
+        }
+    }
+
+    /// How photons are traced.
+    pub(super) fn plan(&self) -> PhotonPlan {
+        PhotonPlan {
+            photons: self.photons,
+            sampler: self.sampler,
+            seed: self.seed,
+            submission_work: self.submission_work,
+            follows_footprints: self.follows_footprints(),
+            tells_caustics: self.final_gather,
+            even_survival: false,
+            stores_lights: false,
+            stored: self.stored(),
         }
     }
 

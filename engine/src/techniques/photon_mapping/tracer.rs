@@ -1,8 +1,9 @@
-//! Photons from the lights through the scene, in waves like those of paths, to the records that a map is made of.
+//! Photons from the lights through the scene, in waves like those of paths, to the records that a map is made of, or to whatever else their deposits are
+//! made into ([`Append`]).
 //!
 //! Sources: H. W. Jensen, "Realistic Image Synthesis Using Photon Mapping", 2001, chapter 5; B. Fabianowski, "Interactive Manycore Photon Mapping", PhD
 //! thesis, Trinity College Dublin, 2011, §3.4.1 and §5.1. Stages: `photon_emit`, a walker's closest hits, `photon_scatter`, its compaction,
-//! `photon_append`.
+//! `photon_append` or another kernel in its place.
 //!
 //! Guarantees: records depend on (seed, pass, number of photons) alone, and their order on the slots of a wave besides, never on the number of threads; photons that were
 //! emitted have escaped or were absorbed, to the count; records that do not fit are never lost silently, since the pass is traced again
@@ -11,7 +12,6 @@
 use std::sync::Arc;
 
 use super::kernel::KernelSettings;
-use super::settings::PhotonSettings;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
@@ -21,6 +21,7 @@ use crate::gpu::shaders::techniques::photon_mapping::{photon_append, photon_emit
 use crate::gpu::shaders::types::{self, Differentials};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
 use crate::gpu::{TexelView, Timings};
+use crate::transport::random::SamplerKind;
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
@@ -68,14 +69,95 @@ impl std::ops::AddAssign for PhotonCounts {
 
 /// What is stored of photons: those scattered at least and at most so often before they land.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stored {
+pub(in crate::techniques) struct Stored {
     pub first_bounce: u32,
     pub last_bounce: u32,
 }
 
+/// What photons are traced for, and how.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::techniques) struct PhotonPlan {
+    /// Photons of a pass.
+    pub photons: u32,
+    pub sampler: SamplerKind,
+    pub seed: u32,
+    /// As [`WalkOptions::work`].
+    pub submission_work: u64,
+    /// They carry footprints.
+    pub follows_footprints: bool,
+    /// They know whether they were scattered diffusely.
+    pub tells_caustics: bool,
+    /// One number of each photon, evenly spread over a pass, decides how far it comes.
+    pub even_survival: bool,
+    /// Deposits are those of virtual lights: of all surfaces that scatter into more than one direction, with the power that arrives.
+    pub stores_lights: bool,
+    pub stored: Stored,
+}
+
+/// What a bounce's deposits are made into.
+pub(in crate::techniques) trait Append: Send {
+    /// Of a record, in texels of four words.
+    fn quarters(&self) -> u32;
+
+    /// Of its kernel, in errors.
+    fn name(&self) -> &'static str;
+
+    fn pipeline(&self) -> PipelineInfo;
+
+    /// Records what makes those that wait into records behind `first` and the wave's earlier ones, as far as there is room for `capacity`.
+    ///
+    /// # Errors
+    /// Those of recording.
+    fn append(
+        &self,
+        pass: &mut Pass<'_>,
+        bounce: &Bounce<'_>,
+        scene: &GpuScene,
+        photons: &PhotonWave<'_>,
+        first: u32,
+        capacity: u32,
+    ) -> Result<()>;
+}
+
+/// Deposits become records of a photon map.
+pub(super) struct PhotonAppend(ComputePipeline<photon_append::Kernel>);
+
+impl PhotonAppend {
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self(gpu.compute_pipeline(&())?))
+    }
+}
+
+impl Append for PhotonAppend {
+    fn quarters(&self) -> u32 {
+        PHOTON_QUARTERS
+    }
+
+    fn name(&self) -> &'static str {
+        "photon_append"
+    }
+
+    fn pipeline(&self) -> PipelineInfo {
+        self.0.info()
+    }
+
+    fn append(
+        &self,
+        pass: &mut Pass<'_>,
+        bounce: &Bounce<'_>,
+        _: &GpuScene,
+        photons: &PhotonWave<'_>,
+        first: u32,
+        capacity: u32,
+    ) -> Result<()> {
+        let push = photon_append::Push { first, capacity };
+        pass.dispatch_indirect(&self.0, &[&bounce.wave, photons], &push, bounce.places.waiting)
+    }
+}
+
 /// Photons of one pass.
 #[derive(Default)]
-pub(super) struct Traced {
+pub(in crate::techniques) struct Traced {
     /// Records in [`PhotonTracer::records`].
     pub records: u32,
     pub counts: PhotonCounts,
@@ -83,9 +165,10 @@ pub(super) struct Traced {
 }
 
 /// Photons of a pass under way.
-pub(super) struct Tracing {
+pub(in crate::techniques) struct Tracing {
     pass: u32,
-    kernel: KernelSettings,
+    /// None for deposits that have none.
+    kernel: Option<KernelSettings>,
     /// First photon of the wave under way, or of the next one.
     first_photon: u32,
     wave: Option<(WalkKey, WaveInFlight)>,
@@ -105,9 +188,9 @@ impl Tracing {
 }
 
 /// Traces photons of a scene.
-pub(super) struct PhotonTracer {
+pub(in crate::techniques) struct PhotonTracer {
     gpu: Gpu,
-    settings: PhotonSettings,
+    plan: PhotonPlan,
     walker: Walker,
     kit: Kit,
 }
@@ -116,9 +199,11 @@ pub(super) struct PhotonTracer {
 struct Kit {
     scene: Arc<GpuScene>,
     stored: Stored,
+    /// Of a pass.
+    photons: u32,
+    append: Box<dyn Append>,
     emit: ComputePipeline<photon_emit::Kernel>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
-    append: ComputePipeline<photon_append::Kernel>,
     differentials: Buffer,
     counters: Buffer,
     counters_readback: Buffer,
@@ -134,13 +219,13 @@ struct PhotonStages<'a> {
     key: WalkKey,
     /// Record of the wave's first deposit.
     first: u32,
-    kernel: &'a KernelSettings,
+    kernel: Option<&'a KernelSettings>,
 }
 
 impl PhotonTracer {
-    pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, settings: &PhotonSettings, stored: Stored) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
-        let has_differentials = settings.follows_footprints();
+        let has_differentials = plan.follows_footprints;
         let emit = photon_emit::Spec {
             has_textures: profile.has_textures,
             has_vertex_colors: profile.has_vertex_colors,
@@ -152,20 +237,23 @@ impl PhotonTracer {
             has_environment: profile.has_environment(),
             has_area_lights: scene.has_area_lights(),
             has_punctual_lights: scene.has_punctual_lights(),
-            sampler_kind: settings.sampler as u32,
+            sampler_kind: plan.sampler as u32,
             has_differentials,
+            even_survival: plan.even_survival,
             ..Default::default()
         };
         let scatter = surface_spec!(photon_scatter, scene, {
             has_multiple_scattering: bsdf.multiple_scattering,
             separable_masking: false,
             has_alpha: profile.has_alpha(),
-            sampler_kind: settings.sampler as u32,
+            sampler_kind: plan.sampler as u32,
             has_differentials,
-            tells_caustics: settings.final_gather,
+            tells_caustics: plan.tells_caustics,
+            stores_lights: plan.stores_lights,
+            even_survival: plan.even_survival,
             ..Default::default()
         });
-        let wanted = settings.photons.next_multiple_of(WALK_GROUP);
+        let wanted = plan.photons.next_multiple_of(WALK_GROUP);
         let slots = wanted.min(default_slots(gpu)).min(slots_of_device(gpu));
         let needs = WaveNeeds {
             waiting: true,
@@ -176,19 +264,19 @@ impl PhotonTracer {
             name: "photon",
             shadows: false,
             bounces: BOUNCES_PER_SUBMISSION,
-            work: settings.submission_work,
+            work: plan.submission_work,
             ..WalkOptions::default()
         };
         let differentials = if has_differentials { slots } else { 1 };
         let work = |name, bytes: usize| gpu.buffer(&BufferDesc::storage(name, bytes as u64, Category::Work));
-        let capacity = (u64::from(settings.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu)) as u32;
+        let quarters = append.quarters();
+        let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
             kit: Kit {
                 emit: gpu.compute_pipeline(&emit)?,
                 scatter: gpu.compute_pipeline(&scatter)?,
-                append: gpu.compute_pipeline(&())?,
                 differentials: work(
                     "photon differentials",
                     size_of::<Differentials>() * differentials as usize,
@@ -196,20 +284,22 @@ impl PhotonTracer {
                 counters: work("photon counters", size_of::<Counters>())?,
                 counters_readback: gpu
                     .buffer(&BufferDesc::readback("photon counters", size_of::<Counters>() as u64))?,
-                records: record_texels(gpu, capacity)?,
+                records: record_texels(gpu, capacity, quarters)?,
                 capacity,
                 emission: scene.emission_choice(gpu)?,
                 scene,
-                stored,
+                stored: plan.stored,
+                photons: plan.photons,
+                append,
             },
             gpu: gpu.clone(),
-            settings: settings.clone(),
+            plan,
         })
     }
 
     /// Goes on with another seed.
     pub fn set_seed(&mut self, seed: u32) {
-        self.settings.seed = seed;
+        self.plan.seed = seed;
     }
 
     /// The records of the last pass, in the order of waves, in each of bounces and photons.
@@ -219,24 +309,24 @@ impl PhotonTracer {
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let kit = &self.kit;
-        let mut all = vec![kit.emit.info(), kit.scatter.info(), kit.append.info()];
+        let mut all = vec![kit.emit.info(), kit.scatter.info(), kit.append.pipeline()];
         all.extend(self.walker.trace_pipelines());
         all.extend(self.walker.compaction_pipelines());
         all
     }
 
-    /// Traces the photons of a pass with kernels so made.
-    pub fn trace(&mut self, pass: u32, kernel: &KernelSettings) -> Result<Traced> {
+    /// Traces the photons of a pass with kernels so made, if their deposits have some.
+    pub fn trace(&mut self, pass: u32, kernel: Option<&KernelSettings>) -> Result<Traced> {
         let mut tracing = self.begin(pass, kernel);
         while !self.advance(&mut tracing)? {}
         Ok(tracing.traced)
     }
 
     /// The photons of a pass before their first submission. A tracer has the memory of one pass: what was under way is given up.
-    pub fn begin(&self, pass: u32, kernel: &KernelSettings) -> Tracing {
+    pub fn begin(&self, pass: u32, kernel: Option<&KernelSettings>) -> Tracing {
         Tracing {
             pass,
-            kernel: *kernel,
+            kernel: kernel.copied(),
             first_photon: 0,
             wave: None,
             traced: Traced::default(),
@@ -250,12 +340,12 @@ impl PhotonTracer {
                 .walker
                 .buffers()
                 .slots()
-                .min(self.settings.photons - tracing.first_photon);
+                .min(self.plan.photons - tracing.first_photon);
             let key = WalkKey {
                 first_sequence: tracing.pass,
                 first_index: tracing.first_photon,
                 indices: photons,
-                seed: self.settings.seed ^ PHOTON_SEED,
+                seed: self.plan.seed ^ PHOTON_SEED,
             };
             tracing.wave = Some((key, self.walker.begin(key, photons)?));
         }
@@ -266,7 +356,7 @@ impl PhotonTracer {
             kit: &self.kit,
             key: *key,
             first: tracing.traced.records,
-            kernel: &tracing.kernel,
+            kernel: tracing.kernel.as_ref(),
         };
         self.walker.advance(wave, &mut stages)?;
         tracing.traced.timings.append(&mut wave.take_timings());
@@ -292,17 +382,18 @@ impl PhotonTracer {
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
-        if tracing.first_photon < self.settings.photons {
+        if tracing.first_photon < self.plan.photons {
             return Ok(false);
         }
-        traced.counts.emitted = u64::from(self.settings.photons);
+        traced.counts.emitted = u64::from(self.plan.photons);
         if traced.records <= self.kit.capacity {
             return Ok(true);
         }
-        let (needed, most) = (u64::from(traced.records), records_of_device(&self.gpu));
+        let quarters = self.kit.append.quarters();
+        let (needed, most) = (u64::from(traced.records), records_of_device(&self.gpu, quarters));
         if needed > most {
             return Err(Error::Overflow {
-                kernel: "photon_append".into(),
+                kernel: self.kit.append.name().into(),
                 what: "photon records".into(),
                 needed,
                 capacity: most,
@@ -310,7 +401,7 @@ impl PhotonTracer {
             });
         }
         let capacity = (needed + needed / 4).min(most) as u32;
-        self.kit.records = record_texels(&self.gpu, capacity)?;
+        self.kit.records = record_texels(&self.gpu, capacity, quarters)?;
         self.kit.capacity = capacity;
         let timings = std::mem::take(&mut traced.timings);
         *traced = Traced {
@@ -346,6 +437,7 @@ impl WalkStages for PhotonStages<'_> {
             radius: 0.5 * (upper - lower).length(),
             scene_upper: upper.to_array(),
             key: self.key,
+            photons: kit.photons,
         };
         recorder.pass("photon: emit", |pass| {
             let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
@@ -366,7 +458,7 @@ impl WalkStages for PhotonStages<'_> {
             first_deposit: kit.stored.first_bounce,
             key: self.key,
             flux_scale: flux_scale(&kit.scene) as f32,
-            kernel: types::KernelSettings {
+            kernel: kernel.map_or_else(Default::default, |kernel| types::KernelSettings {
                 shape: kernel.shape as u32,
                 spread: kernel.spread as f32,
                 exponent: kernel.exponent as f32,
@@ -375,7 +467,7 @@ impl WalkStages for PhotonStages<'_> {
                 length_max: kernel.length_max as f32,
                 flatness: kernel.flatness as f32,
                 widens_flat: u32::from(kernel.widens_flat),
-            },
+            }),
         };
         recorder.pass("photon: scatter", |pass| {
             let (scene, own) = (kit.scene.scene_set(), kit.wave_set());
@@ -390,12 +482,9 @@ impl WalkStages for PhotonStages<'_> {
     fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let kit = self.kit;
         recorder.pass("photon: append", |pass| {
-            let push = photon_append::Push {
-                first: self.first,
-                capacity: kit.capacity,
-            };
             let own = kit.wave_set();
-            pass.dispatch_indirect(&kit.append, &[&bounce.wave, &own], &push, bounce.places.waiting)?;
+            kit.append
+                .append(pass, bounce, &kit.scene, &own, self.first, kit.capacity)?;
             stage_barrier(pass);
             Ok(())
         })
@@ -418,15 +507,15 @@ pub(super) fn flux_scale(scene: &GpuScene) -> f64 {
     if power > 0.0 { STORED_FLUX / power } else { 1.0 }
 }
 
-/// Records that a buffer of the device can hold.
-fn records_of_device(gpu: &Gpu) -> u64 {
+/// Records of so many quarters that a buffer of the device can hold.
+fn records_of_device(gpu: &Gpu, of_record: u32) -> u64 {
     let caps = gpu.caps();
     let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
-    (quarters / u64::from(PHOTON_QUARTERS)).min(u64::from(u32::MAX / 2))
+    (quarters / u64::from(of_record)).min(u64::from(u32::MAX / 2))
 }
 
-fn record_texels(gpu: &Gpu, records: u32) -> Result<TexelView> {
-    let texels = u64::from(records) * u64::from(PHOTON_QUARTERS);
+fn record_texels(gpu: &Gpu, records: u32, of_record: u32) -> Result<TexelView> {
+    let texels = u64::from(records) * u64::from(of_record);
     gpu.storage_texels("photon records", Category::Work, vk::Format::R32G32B32A32_UINT, texels)
 }
 

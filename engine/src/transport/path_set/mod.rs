@@ -34,6 +34,21 @@ const STATES: usize = PATH_SET_STATES as usize;
 /// Successors of which each is none.
 const NO_SUCCESSORS: u32 = (1 << (PATH_SET_STATE_BITS * SYMBOLS as u32)) - 1;
 
+/// Successors after rough scattering, specular scattering and scattering in media.
+const fn by_class(rough: u32, specular: u32, volume: u32) -> u32 {
+    let (mut word, mut symbol) = (0, 0);
+    while symbol < SYMBOLS as u32 {
+        let next = match 1 << symbol {
+            lobe if lobe & LOBE_VOLUME != 0 => volume,
+            lobe if lobe & LOBE_SPECULAR != 0 => specular,
+            _ => rough,
+        };
+        word |= next << (PATH_SET_STATE_BITS * symbol);
+        symbol += 1;
+    }
+    word
+}
+
 /// A set of light paths.
 ///
 /// A path is a word of scattering events between light and eye; each event is a lobe: diffuse, glossy or specular, reflected or
@@ -68,12 +83,28 @@ impl PathSet {
     pub const UP_TO_DIRECT: Self = Self::simple(0, Some(1), PATH_SET_LOBES);
     /// The same, scattered diffusely: `LE|LDE`.
     pub const UP_TO_DIFFUSE: Self = Self::simple(0, Some(1), LOBE_DIFFUSE);
+    /// All but light that comes off a mirror to the first rough surface that the eye sees: `!L.*S[DG]S*E`.
+    pub const LIT_OFF_NO_MIRROR: Self = Self::LIT_OFF_NO_MIRROR_STATES;
     /// No path: a black picture.
     pub const EMPTY: Self = Self {
         min_bounces: 0,
         max_bounces: None,
         successors: [NO_SUCCESSORS; STATES],
         accepting: 0,
+    };
+
+    /// Through mirrors, at the first rough surface, and beyond, where nothing is left out.
+    const LIT_OFF_NO_MIRROR_STATES: Self = {
+        let mut successors = [NO_SUCCESSORS; STATES];
+        successors[0] = by_class(1, 0, 2);
+        successors[1] = by_class(2, PATH_SET_DEAD, 2);
+        successors[2] = by_class(2, 2, 2);
+        Self {
+            min_bounces: 0,
+            max_bounces: None,
+            successors,
+            accepting: 0b111,
+        }
     };
 
     /// Any order of some lobes.

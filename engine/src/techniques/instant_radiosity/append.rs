@@ -1,0 +1,54 @@
+//! Deposits of walks from the lights become virtual lights (`virtual_light.glsl`).
+
+use crate::Result;
+use crate::gpu::shaders::constants::VIRTUAL_LIGHT_QUARTERS;
+use crate::gpu::shaders::sets::PhotonWave;
+use crate::gpu::shaders::techniques::instant_radiosity::vpl_append;
+use crate::gpu::{ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::techniques::photon_mapping::Append;
+use crate::transport::{GpuScene, surface_spec};
+use crate::walk::Bounce;
+
+/// The kernel, for a scene.
+pub(super) struct LightAppend(ComputePipeline<vpl_append::Kernel>);
+
+impl LightAppend {
+    pub fn new(gpu: &Gpu, scene: &GpuScene) -> Result<Self> {
+        let spec = surface_spec!(vpl_append, scene, { has_multiple_scattering: false, ..Default::default() });
+        Ok(Self(gpu.compute_pipeline(&spec)?))
+    }
+}
+
+impl Append for LightAppend {
+    fn quarters(&self) -> u32 {
+        VIRTUAL_LIGHT_QUARTERS
+    }
+
+    fn name(&self) -> &'static str {
+        "vpl_append"
+    }
+
+    fn pipeline(&self) -> PipelineInfo {
+        self.0.info()
+    }
+
+    fn append(
+        &self,
+        pass: &mut Pass<'_>,
+        bounce: &Bounce<'_>,
+        scene: &GpuScene,
+        photons: &PhotonWave<'_>,
+        first: u32,
+        capacity: u32,
+    ) -> Result<()> {
+        let [lower, upper] = scene.bounds().map(|corner| corner.to_array());
+        let push = vpl_append::Push {
+            scene_lower: lower,
+            first,
+            scene_upper: upper,
+            capacity,
+        };
+        let set = scene.scene_set();
+        pass.dispatch_indirect(&self.0, &[&bounce.wave, &set, photons], &push, bounce.places.waiting)
+    }
+}

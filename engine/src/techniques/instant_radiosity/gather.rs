@@ -1,0 +1,353 @@
+//! Virtual lights at work: where eye paths have arrived, all of them, with a shadow ray each. A stage of the path tracer's bounces.
+//!
+//! Places × lights are never stored: an invocation takes the lights of its place one after the other, as many a dispatch as the loops of the device allow, and
+//! goes on in the next one. So memory is that of the places, whatever the number of lights.
+
+use super::settings::VirtualLightSettings;
+use crate::catalogue::{Bias, Role, Row, sources};
+use crate::gpu::interface::BindingSet;
+use crate::gpu::shaders::constants::{
+    INSTANCE_SEARCH_STEPS, LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD, PATH_SET_STATE_BITS, WALK_GROUP,
+};
+use crate::gpu::shaders::sets::{VirtualLightSet, WaveSet};
+use crate::gpu::shaders::techniques::instant_radiosity::vpl_gather;
+use crate::gpu::shaders::types::GatherState;
+use crate::gpu::{
+    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo, Recorder,
+    SOFTWARE_LOOP_CAP, TexelView, wide_counter,
+};
+use crate::transport::edge_bound::EdgeBound;
+use crate::transport::{GpuScene, PathSet, surface_spec};
+use crate::walk::{ArrivalStage, Places, RAY_QUOTA, StoppedPlaces, stage_barrier};
+use crate::{Error, Result};
+
+/// Lights that a place takes in one dispatch: enough to be worth looking the surface up again.
+const SOFTWARE_LIGHTS: u32 = 64;
+const DEVICE_LIGHTS: u32 = 64;
+/// Loop iterations below which a ray is stopped too often: fewer lights share a dispatch then.
+const QUOTA_WANTED: u32 = 256;
+/// Searches for an instance of a connection, beside those of its ray: three surfaces are looked up.
+const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
+/// Connections of a submission that goes on with places that have stopped: a second or less on two cores.
+const SOFTWARE_CONNECTIONS: u64 = 1 << 19;
+const DEVICE_CONNECTIONS: u64 = 1 << 26;
+/// Sweeps over the places that have stopped beyond those which the lights take, for each light: rays longer than that never end.
+const SWEEPS_A_LIGHT: u64 = 4096;
+
+/// Exact counts of connections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
+pub struct VirtualLightCounts {
+    /// Points that gathered.
+    pub gathers: u64,
+    /// Pairs of a point and a virtual light.
+    pub connections: u64,
+    /// Those whose shadow ray was traced: the others bring nothing, whatever stands between.
+    pub shadow_rays: u64,
+}
+
+/// The kernel of connections, and what places keep between its dispatches.
+pub(super) struct Gather {
+    pipeline: ComputePipeline<vpl_gather::Kernel>,
+    states: Buffer,
+    counters: Buffer,
+    counters_readback: Buffer,
+    /// States of eye paths whose rough surfaces gather, a bit each.
+    path_states: u32,
+    bounces: [u32; 2],
+    edge_bound: EdgeBound,
+    lights_at_once: u32,
+    /// Connections of a submission.
+    connections: u64,
+}
+
+/// Connections to the virtual lights of a pass, to be recorded with a wave.
+pub(super) struct GatherStage<'a> {
+    pub gather: &'a Gather,
+    pub scene: &'a GpuScene,
+    pub lights: &'a TexelView,
+    pub count: u32,
+    /// One over the walks of the pass.
+    pub scale: f32,
+    /// [`PathTracer::departures`](crate::techniques::PathTracer::departures).
+    pub departures: Buffer,
+    /// Of the random numbers that alpha is drawn by.
+    pub seed: u32,
+}
+
+type Counters = vpl_gather::VirtualLightCounters;
+
+impl Gather {
+    /// For eye paths of the set `eye`, up to `slots` at once.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        settings: &VirtualLightSettings,
+        eye: &PathSet,
+        edge_bound: EdgeBound,
+        slots: u32,
+    ) -> Result<Self> {
+        let profile = scene.profile();
+        let (lights_at_once, index_quota) = lights_at_once(gpu, scene, settings.lights_at_once)?;
+        let traversal = scene.index_traversal();
+        let spec = surface_spec!(vpl_gather, scene, {
+            has_multiple_scattering: scene.bsdf_features().multiple_scattering,
+            separable_masking: false,
+            has_alpha: profile.has_alpha(),
+            has_path_automaton: eye.has_automaton(),
+            edge_bound: edge_bound.kind(),
+            counts_bounces: settings.least_bounces > 2 || settings.most().is_some(),
+            lights_at_once,
+            index_quota,
+            index_kind: traversal.kind(),
+            ..Default::default()
+        });
+        let bytes = size_of::<Counters>() as u64;
+        let states = size_of::<GatherState>() as u64 * u64::from(slots);
+        Ok(Self {
+            pipeline: traversal.pipeline(gpu, &spec)?,
+            states: gpu.buffer(&BufferDesc::storage("virtual light states", states, Category::Work))?,
+            counters: gpu.buffer(&BufferDesc::storage("virtual light counters", bytes, Category::Work))?,
+            counters_readback: gpu.buffer(&BufferDesc::readback("virtual light counters", bytes))?,
+            path_states: gathering_states(eye),
+            bounces: [settings.least_bounces, settings.most().unwrap_or(u32::MAX)],
+            edge_bound,
+            lights_at_once,
+            connections: match gpu.caps().kind {
+                DeviceKind::Cpu => SOFTWARE_CONNECTIONS,
+                _ => DEVICE_CONNECTIONS,
+            },
+        })
+    }
+
+    pub fn pipeline(&self) -> PipelineInfo {
+        self.pipeline.info()
+    }
+
+    /// Counts of the last wave.
+    pub fn counts(&self) -> Result<VirtualLightCounts> {
+        let counters = self.read()?;
+        Ok(VirtualLightCounts {
+            gathers: u64::from(counters.gathers),
+            connections: wide_counter(counters.connections),
+            shadow_rays: wide_counter(counters.shadow_rays),
+        })
+    }
+
+    fn read(&self) -> Result<Counters> {
+        Ok(self.counters_readback.read::<Counters>(0, 1)?[0])
+    }
+}
+
+/// Lights that a place takes in a dispatch, and loop iterations after which a shadow ray goes on in the next: together they stay below what software drivers run.
+fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<(u32, u32)> {
+    let filters = scene.profile().has_alpha();
+    let most = match gpu.caps().kind {
+        DeviceKind::Cpu => SOFTWARE_LIGHTS,
+        _ => DEVICE_LIGHTS,
+    };
+    let mut lights = if wanted == 0 { most } else { wanted.min(most) };
+    loop {
+        // The loop over lights itself, and what a connection takes beside its ray.
+        let beside = 1 + if scene.profile().keeps_instances { SEARCHES } else { 0 };
+        let each = (SOFTWARE_LOOP_CAP / lights).saturating_sub(beside);
+        let lanes = if filters { gpu.caps().subgroup_size.max(1) } else { 1 };
+        let quota = RAY_QUOTA.min(each / lanes);
+        match scene.index_traversal().quota_within(gpu.caps(), quota, each, filters) {
+            Ok(quota) if quota >= QUOTA_WANTED || lights == 1 => return Ok((lights, quota)),
+            Err(error) if lights == 1 => return Err(error),
+            _ => lights /= 2,
+        }
+    }
+}
+
+/// The states of eye paths whose rough surfaces virtual lights light: those that may be scattered diffusely once more.
+fn gathering_states(eye: &PathSet) -> u32 {
+    const DIFFUSE: u32 = (LOBE_DIFFUSE & LOBE_REFLECTION).trailing_zeros();
+    let successors = eye.successors();
+    let scatters = |word: &u32| word >> (PATH_SET_STATE_BITS * DIFFUSE) & PATH_SET_DEAD != PATH_SET_DEAD;
+    (0..successors.len()).fold(0, |states, state| {
+        states | u32::from(scatters(&successors[state])) << state
+    })
+}
+
+impl GatherStage<'_> {
+    fn push(&self) -> vpl_gather::Push {
+        let [lower, upper] = self.scene.bounds().map(|corner| corner.to_array());
+        vpl_gather::Push {
+            scene_lower: lower,
+            states: self.gather.path_states,
+            scene_upper: upper,
+            least_bounces: self.gather.bounces[0],
+            most_bounces: self.gather.bounces[1],
+            lights: self.count,
+            scale: self.scale,
+            edge_bound: self.gather.edge_bound.value(),
+            seed: self.seed,
+            first_place: 0,
+            goes_on: 0,
+        }
+    }
+
+    fn set(&self) -> VirtualLightSet<'_> {
+        VirtualLightSet {
+            virtual_light_texels: self.lights,
+            virtual_light_states: self.gather.states.view(),
+            gather_counters: self.gather.counters.view(),
+            light_departures: self.departures.view(),
+        }
+    }
+
+    /// Places of a submission that goes on, in whole workgroups.
+    fn places(&self) -> u32 {
+        let places = self.gather.connections / u64::from(self.gather.lights_at_once);
+        (places.min(u64::from(u32::MAX / 2)) as u32).next_multiple_of(WALK_GROUP)
+    }
+}
+
+impl ArrivalStage for GatherStage<'_> {
+    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+        let pipeline = &self.gather.pipeline;
+        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
+        recorder.pass("vpl: gather", |pass| {
+            let sets: [&dyn BindingSet<'_>; 4] = [wave, &index, &scene, &own];
+            pass.dispatch_indirect(pipeline, &sets, &self.push(), places.items)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.update(self.gather.counters.view(), &[Counters::default()])
+    }
+
+    fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.copy(self.gather.counters.view(), self.gather.counters_readback.view())
+    }
+
+    /// Sweep after sweep over the places, until none has lights left; after each the device's count of these is read.
+    fn record_stopped(
+        &self,
+        recorder: &mut Recorder,
+        wave: &WaveSet<'_>,
+        stopped: StoppedPlaces,
+        part: u64,
+    ) -> Result<Option<u64>> {
+        let gather = self.gather;
+        let places = self.places();
+        let ranges = u64::from(stopped.places.div_ceil(places)).max(1);
+        let (sweep, range) = (part / ranges, part % ranges);
+        if range == 0 && sweep > 0 {
+            if gather.read()?.remaining == 0 {
+                return Ok(None);
+            }
+            let most = u64::from(self.count) * SWEEPS_A_LIGHT;
+            if sweep > most {
+                return Err(Error::Overflow {
+                    kernel: "vpl_gather".into(),
+                    what: "sweeps over the virtual lights".into(),
+                    needed: sweep,
+                    capacity: most,
+                    instead: "choose another ray index".into(),
+                });
+            }
+        }
+        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
+        let push = vpl_gather::Push {
+            first_place: range as u32 * places,
+            goes_on: 1,
+            ..self.push()
+        };
+        recorder.pass("vpl: gather on", |pass| {
+            if range == 0 {
+                let offset = std::mem::offset_of!(Counters, remaining) as u64;
+                pass.fill(gather.counters.slice(offset, size_of::<u32>() as u64), 0)?;
+                pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+            }
+            let groups = [gather.pipeline.groups_for(places.min(stopped.places)), 1, 1];
+            pass.dispatch(&gather.pipeline, &[wave, &index, &scene, &own], &push, groups)?;
+            if range + 1 == ranges {
+                pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
+                self.read_back(pass)?;
+            }
+            stage_barrier(pass);
+            Ok(())
+        })?;
+        Ok(Some(part + 1))
+    }
+}
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "BG-8",
+        name: "gathering from virtual lights under a bound, min(G, b) or max(d², B)",
+        role: Role::PartOf("SVO-G0"),
+        limits: "A bound alone leaves out light near edges and corners, each its own part: of a sphere of radius R, max(d², B) leaves out B/(8R²).",
+        sources: &[
+            sources::KELLER_1997.whole(),
+            sources::KOLLIG_KELLER_2006.whole(),
+            sources::ENGELHARDT_2013.at("§4.5, §10.1 and §11.1"),
+        ],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/vpl_gather.comp",
+            "shaders/transport/edge_bound.glsl",
+        ],
+        bias: Some(Bias::Biased("what a bound leaves out, unless it is compensated")),
+        tests: &[
+            "engine/src/transport/edge_bound.rs::bounds_hold_and_shares_make_them",
+            "engine/src/transport/edge_bound.rs::points_at_one_place_have_a_share_that_is_a_number",
+            "tests/tests/twins/edges.rs::edges_agree_with_their_twins",
+            "tests/tests/twins/edges.rs::in_a_sphere_every_virtual_light_brings_the_same",
+            "tests/tests/twins/edges.rs::distances_that_are_bounded_lose_what_the_sphere_says",
+            "tests/tests/twins/edges.rs::squares_have_their_form_factors",
+            "tests/tests/instant_radiosity/bounds.rs::bounds_leave_out_what_they_should",
+            "tests/tests/instant_radiosity/edge_cases.rs::pictures_do_not_depend_on_how_lights_are_shared_out",
+        ],
+        api: &["clerestory::transport::edge_bound"],
+        settings: &["bound", "bound_value"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "BG-9",
+        name: "compensation of bounds by eye paths that go on, until their weight is zero",
+        role: Role::PartOf("SVO-G0"),
+        limits: "Each step gathers from all virtual lights again, so that small bounds on G cost as much as path tracing with a gather a vertex.",
+        sources: &[
+            sources::KOLLIG_KELLER_2006.whole(),
+            sources::ENGELHARDT_2013.at("§4.5.1"),
+        ],
+        shaders: &[
+            "shaders/techniques/path/path_shade.comp",
+            "shaders/techniques/instant_radiosity/vpl_gather.comp",
+        ],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "tests/tests/twins/edges.rs::what_a_bound_leaves_of_a_wall_is_the_published_table",
+            "tests/tests/instant_radiosity/bounds.rs::steps_of_compensation_leave_a_geometric_series",
+            "tests/tests/instant_radiosity/agreement.rs::compensated_bounds_agree_with_the_path_tracer",
+        ],
+        settings: &["compensation", "compensation_steps"],
+        ..Row::of(file!())
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rough_vertices_gather_where_a_path_may_be_scattered_once_more() {
+        let states = |text: &str| {
+            let set: PathSet = text.parse().unwrap();
+            // The first state is that of the eye; by how many others gather.
+            let states = gathering_states(&set);
+            (states & 1, states.count_ones())
+        };
+        // Direct light alone: the first rough vertex gathers, no other does.
+        assert_eq!(states("L[DG]?S*E"), (1, 1));
+        // Every vertex, as the last one before a mirror, the next, and all after it.
+        assert_eq!(states("!L.*S[DG]S*E"), (1, 3));
+        assert_eq!(states("L[DG]{0,3}S*E"), (1, 3));
+    }
+}

@@ -1,0 +1,12 @@
+//! Instant radiosity: indirect light as that of virtual point lights, which walks from the lights leave on surfaces.
+
+mod append;
+mod card;
+mod gather;
+mod renderer;
+mod settings;
+
+pub(super) use card::CARD;
+pub use gather::VirtualLightCounts;
+pub use renderer::{PassCounts, VirtualLight, VirtualLights};
+pub use settings::{Bound, Compensation, VirtualLightSettings};

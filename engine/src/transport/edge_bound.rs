@@ -1,0 +1,97 @@
+//! Bounds of the geometry term G = cos cos / d² between two points that see each other, whose 1/d² no sampling of points removes.
+//!
+//! Two bounds are in use, and they lose different light: min(G, b) leaves edges at grazing angles alone (Kollig and Keller, "Illumination in the Presence of
+//! Weak Singularities", 2006), max(d², B) in the denominator bounds the distance whatever the angles. Each is a share of G in \[0, 1\]: what it leaves out has
+//! the weight of one less that share, by which other means can bring it, so that both together are unbiased. The shares take cosines to geometric
+//! normals: whoever estimates the one part and whoever estimates the other must agree on them, whatever they shade by. Exactly 1 where a
+//! bound does nothing. Units: b in m⁻², B in m². Twin of `transport/edge_bound.glsl`.
+
+use crate::gpu::shaders::constants::{EDGE_DISTANCE, EDGE_GEOMETRY, EDGE_UNBOUNDED};
+
+/// A bound.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum EdgeBound {
+    /// None.
+    #[default]
+    Unbounded,
+    /// G is this at most, m⁻².
+    Geometry(f64),
+    /// The squared distance counts as this at least, m².
+    Distance(f64),
+}
+
+impl EdgeBound {
+    /// What kernels are specialized to.
+    pub(crate) fn kind(self) -> u32 {
+        match self {
+            Self::Unbounded => EDGE_UNBOUNDED,
+            Self::Geometry(_) => EDGE_GEOMETRY,
+            Self::Distance(_) => EDGE_DISTANCE,
+        }
+    }
+
+    /// What they are told.
+    pub(crate) fn value(self) -> f32 {
+        match self {
+            Self::Unbounded => 0.0,
+            Self::Geometry(value) | Self::Distance(value) => value as f32,
+        }
+    }
+}
+
+/// Cosines at both ends over the squared distance, m⁻².
+pub fn geometry_term(cos_a: f64, cos_b: f64, squared: f64) -> f64 {
+    cos_a * cos_b / squared
+}
+
+/// The part of the geometry term that a bound leaves, in \[0, 1\].
+pub fn bounded_share(bound: EdgeBound, cos_a: f64, cos_b: f64, squared: f64) -> f64 {
+    match bound {
+        EdgeBound::Unbounded => 1.0,
+        EdgeBound::Geometry(most) => {
+            let (cosines, most) = (cos_a * cos_b, most * squared);
+            if most < cosines { most / cosines } else { 1.0 }
+        }
+        EdgeBound::Distance(least) if squared < least => squared / least,
+        EdgeBound::Distance(_) => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_random::Random;
+
+    #[test]
+    fn bounds_hold_and_shares_make_them() {
+        let mut random = Random(5);
+        for _ in 0..10_000 {
+            let (a, b) = (f64::from(random.unit()), f64::from(random.unit()));
+            let squared = f64::from(random.magnitude(-8, 8));
+            let limit = f64::from(random.magnitude(-8, 8));
+            let g = geometry_term(a, b, squared);
+            let by_geometry = g * bounded_share(EdgeBound::Geometry(limit), a, b, squared);
+            assert!(
+                (by_geometry - g.min(limit)).abs() <= 1e-12 * g.min(limit),
+                "{g} {limit}"
+            );
+            let by_distance = g * bounded_share(EdgeBound::Distance(limit), a, b, squared);
+            let expected = a * b / squared.max(limit);
+            assert!((by_distance - expected).abs() <= 1e-12 * expected, "{g} {limit}");
+            assert_eq!(bounded_share(EdgeBound::Unbounded, a, b, squared), 1.0);
+        }
+    }
+
+    #[test]
+    fn points_at_one_place_have_a_share_that_is_a_number() {
+        for bound in [EdgeBound::Geometry(3.0), EdgeBound::Distance(3.0)] {
+            assert_eq!(bounded_share(bound, 1.0, 1.0, 0.0), 0.0, "{bound:?}");
+        }
+        // Two points of one plane lose nothing to a bound of G, which is zero there, and all to one of the distance.
+        assert_eq!(bounded_share(EdgeBound::Geometry(3.0), 0.0, 0.0, 0.0), 1.0);
+        assert_eq!(bounded_share(EdgeBound::Distance(3.0), 0.0, 0.0, 0.0), 0.0);
+        // Edges that are long enough are whole, to the bit.
+        assert_eq!(bounded_share(EdgeBound::Geometry(3.0), 1.0, 1.0, 1.0), 1.0);
+        assert_eq!(bounded_share(EdgeBound::Distance(3.0), 1.0, 1.0, 3.0), 1.0);
+    }
+}

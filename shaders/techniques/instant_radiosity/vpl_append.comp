@@ -1,0 +1,51 @@
+#version 460
+// The deposits of a bounce become virtual lights behind those that are there, in the order of the queue: the same order on every run, where appending
+// by a counter would give another each time.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/features.glsl"
+#include "techniques/photon_mapping/photon_wave.glsl"
+#include "transport/arrival.glsl"
+#include "techniques/instant_radiosity/virtual_light.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint first;     // record of the wave's first deposit
+    vec3 scene_upper;
+    uint capacity;  // records
+} push;
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled != STALLED_NOT || place >= status.waiting_count) {
+        return;
+    }
+    // The scan has counted this bounce already.
+    uint record = push.first + (status.waited[0] - status.waiting_count) + place;
+    if (record >= push.capacity) {
+        return;
+    }
+    int source = int(WAITING_QUARTERS * texelFetch(walk_waiting_queue_in, int(place)).x);
+    uvec4 where = texelFetch(walk_waiting_in, source);
+    vec3 power = uintBitsToFloat(texelFetch(walk_waiting_in, source + 1).xyz);
+    vec3 direction = uintBitsToFloat(texelFetch(walk_waiting_in, source + 2).xyz);
+    vec2 barycentrics = uintBitsToFloat(where.xy);
+    Arrival a = arrival_at(Hit(0.0, barycentrics, where.z), direction, push.scene_lower, push.scene_upper);
+    VirtualLight light;
+    light.position = a.surface.point.position;
+    light.triangle = where.z;
+    light.normal = a.facing;
+    light.offset = dot(abs(a.facing), a.surface.point.error);
+    light.power = power;
+    light.direction = direction;
+    light.surface = LAMBERT ? cosine_lobes(a.bsdf, 1.0, false, LOBE_DIFFUSE).diffuse : vec3(barycentrics, 0.0);
+    light.bounce = where.w;
+    uvec4 quarters[VIRTUAL_LIGHT_QUARTERS];
+    pack_virtual_light(light, quarters);
+    for (uint i = 0u; i < VIRTUAL_LIGHT_QUARTERS; ++i) {
+        photon_records[VIRTUAL_LIGHT_QUARTERS * record + i] = quarters[i];
+    }
+}

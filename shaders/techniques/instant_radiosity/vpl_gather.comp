@@ -1,0 +1,251 @@
+#version 460
+// Radiance from all virtual lights of a pass where eye paths have arrived, at surfaces that scatter into more than one direction: the scattering functions at
+// both ends, the geometry term between them up to its bound, and a shadow ray.
+//
+// An invocation is for a place, and takes the lights in their order, so many a dispatch. A place that has not had all of them, or whose ray a quota stops,
+// notes where it is, marks itself and stalls the wave; further dispatches go on there. Places that are left for later, since the submission's work is used up,
+// stall the wave before they begin. Sums are kept between dispatches, so that they are the same bits however lights are shared out among them.
+//
+// SVO-G0, BG-8, BG-10, MET-V1: A. Keller, "Instant Radiosity", 1997; T. Kollig and A. Keller, "Illumination in the Presence of Weak Singularities", 2006.
+// Deterministic: a path's sum has the order of the lights.
+// variant: driver
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/features.glsl"
+#include "walk/wave.glsl"
+#include "techniques/instant_radiosity/virtual_light.glsl"
+#include "techniques/photon_mapping/adjoint_ratio.glsl"
+#include "transport/arrival.glsl"
+#include "transport/edge_bound.glsl"
+#include "transport/path_set.glsl"
+
+layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
+layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
+layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // of a place, in a dispatch
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint states;         // of a path whose rough surfaces gather, a bit each
+    vec3 scene_upper;
+    uint least_bounces;  // scatterings in all
+    uint most_bounces;
+    uint lights;
+    float scale;         // one over the walks of the pass
+    float edge_bound;    // of EDGE_BOUND
+    uint seed;
+    uint first_place;
+    uint goes_on;        // 1 for places that have stopped
+} push;
+
+#include "transport/random.glsl"
+#include "walk/candidate_alpha.glsl"
+
+#define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
+#include "accel/index.glsl"
+
+// descriptor set 3: VirtualLightSet
+
+// What a place has had of the lights, where it goes on.
+struct GatherState {
+    vec3 sum;
+    uint light;   // the next one
+    uint cursor;  // where its shadow ray goes on
+};
+
+layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
+layout(set = 3, binding = 1, scalar) restrict buffer VirtualLightStates { GatherState gather_states[]; };  // by place
+layout(set = 3, binding = 2, scalar) restrict buffer VirtualLightCounters {
+    uint gathers;          // places that gathered
+    uint remaining;        // places of a sweep that have not had all lights
+    uint connections[2];   // 64 bits, low word first: pairs of a place and a light
+    uint shadow_rays[2];   // those that might bring light
+} gather_counters;
+layout(set = 3, binding = 3, scalar) restrict readonly buffer LightDepartures { float departures[]; };  // path_departures, by slot
+
+// Stand in walk_resume for a place that goes on in a later dispatch, and for one that has no light to gather or is done.
+const uint GATHER_STOPPED = 0xFFFFFFFEu;
+const uint GATHER_DONE = 0xFFFFFFFCu;
+// The greatest finite number.
+const float FINITE_MAX = 3.402823e38;
+// Tells the candidates of these rays from those of the paths' own.
+const uint GATHER_SEED = 0x76706c73u;
+// Loop iterations that a connection without its ray counts as.
+const uint CONNECTION_ITERATIONS = 4u;
+
+#define COUNT_WIDE(COUNTER, AMOUNT) { \
+    uint counted_amount = AMOUNT; \
+    if (atomicAdd(gather_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
+        atomicAdd(gather_counters.COUNTER[1], 1u); \
+    } \
+}
+
+// Where the path of an invocation has arrived.
+struct Receiver {
+    Arrival arrival;
+    ScatteringFrame frame;
+    uint interior;    // body that the way there was in
+    uint bounce;      // scatterings between the point and the eye
+    vec3 throughput;  // from the point on
+};
+
+uint arriving_bounce(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
+uint arriving_state(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }
+
+// Prepares the receiver of a place; false where nothing is gathered.
+bool begin_receiver(uint slot, uint place, out Receiver r) {
+    WalkState path = load_walk(slot);
+    Hit hit = load_hit(place);
+    r.bounce = arriving_bounce(path);
+    // A light and the receiver scatter once more each.
+    if ((push.states >> arriving_state(path) & 1u) == 0u || hit.triangle == NO_HIT || (COUNTS_BOUNCES && r.bounce + 2u > push.most_bounces)) {
+        return false;
+    }
+    r.arrival = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
+    if (arrival_is_unlit(r.arrival) || !arrival_has_rough_lobes(r.arrival)) {
+        return false;
+    }
+    r.interior = arrival_interior(r.arrival, HAS_TRANSMISSION ? walk_gathered[slot].interior : OUTSIDE);
+    r.throughput = absorbed(path.throughput, r.interior, hit.t);
+    if (EDGE_BOUND != EDGE_UNBOUNDED && path.pdf > 0.0) {
+        // The path has come over an edge of whose light virtual lights bring what its bound leaves.
+        float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
+        float cos_here = abs(dot(path.direction, r.arrival.surface.geometric_normal));
+        r.throughput *= 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, hit.t * hit.t);
+    }
+    r.frame = scattering_frame(r.arrival, arrival_normal(r.arrival));
+    return r.throughput != vec3(0.0);
+}
+
+// Radiant intensity over power, with the cosine, that a virtual light sends along `out_direction`, 1/sr.
+vec3 light_scattering(VirtualLight light, vec3 out_direction) {
+    if (LAMBERT) {
+        return light.surface * (INV_PI * max(dot(light.normal, out_direction), 0.0));
+    }
+    Arrival a = arrival_at(Hit(0.0, light.surface.xy, light.triangle), light.direction, push.scene_lower, push.scene_upper);
+    a.bsdf.flags |= BSDF_IMPORTANCE;
+    ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
+    if (!sides_agree(frame.z, frame.outward, out_direction)) {
+        return vec3(0.0);
+    }
+    vec3 scattered = bsdf_eval(a.bsdf, frame.wo, world_to_frame(frame, out_direction), LOBE_ALL);
+    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
+        scattered *= adjoint_ratio(frame.z, a.surface.geometric_normal, a.wo, out_direction);
+    }
+    return scattered;
+}
+
+// Radiance that the receiver scatters of a virtual light's, if nothing stands between, and the ray that tells.
+vec3 connection(Receiver r, VirtualLight light, out Ray ray) {
+    Surface s = r.arrival.surface;
+    vec3 way = light.position - s.point.position;
+    float squared = dot(way, way);
+    vec3 wi = way * inversesqrt(squared);
+    ray = Ray(vec3(0.0), 0.0, vec3(0.0), 1.0);
+    uint bounces = r.bounce + light.bounce + 2u;
+    bool counts = !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces);
+    // A light at the point itself is on its own surface, or its distance is lost to rounding.
+    if (!counts || !(squared > 0.0) || !sides_agree(r.frame.z, r.frame.outward, wi)) {
+        return vec3(0.0);
+    }
+    vec3 found = light_scattering(light, -wi);
+    if (found == vec3(0.0)) {
+        return vec3(0.0);
+    }
+    found *= bsdf_eval(r.arrival.bsdf, r.frame.wo, world_to_frame(r.frame, wi), LOBE_ALL) * light.power / squared;
+    if (EDGE_BOUND != EDGE_UNBOUNDED) {
+        float cos_here = abs(dot(wi, s.geometric_normal));
+        float cos_there = abs(dot(wi, light.normal));
+        found *= bounded_share(EDGE_BOUND, push.edge_bound, cos_here, cos_there, squared);
+    }
+    if (HAS_ABSORPTION) {
+        uint passed = r.arrival.solid ? (dot(wi, r.frame.outward) < 0.0 ? s.material : OUTSIDE) : r.interior;
+        found = absorbed(found, passed, sqrt(squared));
+    }
+    ray.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
+    vec3 end = light.position + light.normal * (dot(light.normal, wi) > 0.0 ? -light.offset : light.offset);
+    ray.direction = end - ray.origin;
+    // What overflows is closer than numbers can tell.
+    return all(lessThanEqual(found, vec3(FINITE_MAX))) ? found : vec3(0.0);
+}
+
+VirtualLight load_virtual_light(uint index) {
+    int first = int(VIRTUAL_LIGHT_QUARTERS * index);
+    return unpack_virtual_light(texelFetch(virtual_light_texels, first), texelFetch(virtual_light_texels, first + 1),
+                                texelFetch(virtual_light_texels, first + 2), texelFetch(virtual_light_texels, first + 3));
+}
+
+// Goes on with the lights of a place.
+void gather(Receiver r, inout GatherState at, out uint rays) {
+    rays = 0u;
+    uint last = min(at.light + LIGHTS_AT_ONCE, push.lights);
+    bool stopped = false;
+    do {
+        Ray ray;
+        vec3 found = connection(r, load_virtual_light(at.light), ray);
+        if (found != vec3(0.0)) {
+            rays += at.cursor == INDEX_START ? 1u : 0u;
+            if (HAS_ALPHA) {
+                // The way to the point stands for the path, of which a stage between knows no number.
+                uvec3 way = floatBitsToUint(r.arrival.wo);
+                candidate_key = uvec4(way, push.seed) + pcg4d(uvec4(at.light, r.bounce, push.lights, GATHER_SEED));
+            }
+            Hit hit = no_hit(ray.t_max);
+            at.cursor = any_hit(ray, at.cursor, hit);
+            stopped = at.cursor != INDEX_FINISHED;
+            at.sum += stopped || hit.triangle != NO_HIT ? vec3(0.0) : found;
+        }
+        at.cursor = stopped ? at.cursor : INDEX_START;
+        at.light += stopped ? 0u : 1u;
+    } while (!stopped && at.light < last);
+}
+
+void main() {
+    uint place = push.first_place + gl_GlobalInvocationID.x;
+    if (status.stalled == STALLED_EXTEND || status.stalled == STALLED_SHADOW || place >= status.active_count) {
+        return;
+    }
+    bool goes_on = push.goes_on != 0u;
+    uint resume = walk_resume[place];
+    if (goes_on ? resume != GATHER_STOPPED : resume == GATHER_STOPPED || resume == GATHER_DONE) {
+        return;
+    }
+    if (!goes_on && !has_work_left()) {
+        leave_for_later(STALLED_ARRIVAL);
+        return;
+    }
+    walk_resume[place] = GATHER_DONE;
+    uint slot = load_slot(place);
+    Receiver r;
+    if (!begin_receiver(slot, place, r)) {
+        return;
+    }
+    GatherState at = GatherState(vec3(0.0), 0u, INDEX_START);
+    if (goes_on) {
+        at = gather_states[place];
+    } else {
+        atomicAdd(gather_counters.gathers, 1u);
+    }
+    uint first = at.light;
+    uint rays;
+    gather(r, at, rays);
+    COUNT_WIDE(connections, at.light - first)
+    COUNT_WIDE(shadow_rays, rays)
+    if (!goes_on) {
+        count_work(index_iterations + CONNECTION_ITERATIONS * LIGHTS_AT_ONCE, WORK_UNIT);
+    }
+    if (at.light == push.lights) {
+        walk_gathered[slot].radiance += r.throughput * at.sum * push.scale;
+        return;
+    }
+    gather_states[place] = at;
+    walk_resume[place] = GATHER_STOPPED;
+    if (goes_on) {
+        atomicAdd(gather_counters.remaining, 1u);
+    } else {
+        atomicAdd(status.unfinished, 1u);
+        atomicMax(status.stalled, STALLED_ARRIVAL);
+    }
+}
