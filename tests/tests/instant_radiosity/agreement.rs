@@ -45,10 +45,10 @@ fn compensated_bounds_agree_with_the_path_tracer() {
         add_point(&mut sphere, Vec3::new(0.3, -0.2, 0.1), Vec3::ONE);
         // Three decades about the bounds that would be chosen, of the one kind in the one scene, of the other in the other.
         for (scene, bound, values) in [
-            (room(), Bound::Geometry, [(0.03, 8), (1.0, 8), (30.0, 16)]),
-            (sphere, Bound::Distance, [(4.0, 8), (0.1, 8), (0.004, 8)]),
+            (room(), Bound::Geometry, [(0.03, 4), (1.0, 4), (30.0, 16)]),
+            (sphere, Bound::Distance, [(4.0, 4), (0.1, 4), (0.004, 4)]),
         ] {
-            let reference = traced(gpu, &scene, 4096);
+            let reference = traced(gpu, &scene, 2048);
             for (bound_value, walks) in values {
                 let settings = VirtualLightSettings {
                     // Of looser bounds more lights, each of which is less of a spike.
