@@ -2,7 +2,7 @@
 #ifndef CLERESTORY_WALK_COUNT_FETCHES_GLSL
 #define CLERESTORY_WALK_COUNT_FETCHES_GLSL
 
-layout(constant_id = 35) const bool COUNT_FETCHES = false;  // for measuring
+layout(constant_id = 36) const bool COUNT_FETCHES = false;  // for measuring
 #define CLERESTORY_COUNT_FETCHES COUNT_FETCHES
 
 #endif
