@@ -125,7 +125,7 @@ fn meshes_without_an_area_are_flattened() {
             ..scene.meshes[line].clone()
         };
         for instance in &mut scene.instances[lines.clone()] {
-            instance.transform = instance.transform * DAffine3::from_scale(DVec3::splat(size));
+            instance.transform *= DAffine3::from_scale(DVec3::splat(size));
         }
         let keeping = Keeping::of(&scene, &profile).expect("others are kept");
         assert!(!keeping.instances[lines.clone()].contains(&true), "{corner}");

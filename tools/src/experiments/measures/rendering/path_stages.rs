@@ -156,7 +156,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Found> {
     let scene = short_name(address);
     let mut found = Found::default();
     for ((waves, _), reports) in WAVES.iter().zip(&all) {
-        let (whole, of_form) = of_reports(&scene, waves, reports);
+        let (whole, of_form) = of_reports(scene, waves, reports);
         found.pictures.push(whole);
         found.stages.extend(of_form);
     }
@@ -164,7 +164,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Found> {
         count_fetches: true,
         ..PathTracerSettings::default()
     })?;
-    found.loads = loads_of(&scene, &counted);
+    found.loads = loads_of(scene, &counted);
     Ok(found)
 }
 
