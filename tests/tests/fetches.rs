@@ -59,7 +59,11 @@ fn stages_fetch_what_is_counted() {
 #[test]
 fn diffuse_scenes_fetch_few_texels_a_segment() {
     with_gpu(|gpu| {
-        let counters = counted(gpu, &builtin("builtin:cornell-box"), &PathTracerSettings::default());
+        let full = PathTracerSettings {
+            whole_waves: false,
+            ..PathTracerSettings::default()
+        };
+        let counters = counted(gpu, &builtin("builtin:cornell-box"), &full);
         let (rays, fetches) = (counters.extend_rays, counters.fetches);
         let of = |stage: usize| fetches.texels[stage] as f64 / rays as f64;
         println!("{:?} a segment", [EXTEND, SHADE, SHADOW].map(of));

@@ -134,6 +134,8 @@ impl VirtualLights {
             seed: settings.seed,
             aovs: settings.aovs,
             submission_work: settings.submission_work,
+            // What arrives is gathered wave by wave, for each pass of walks.
+            whole_waves: true,
             ..PathTracerSettings::default()
         };
         // Takes as much memory as is left, if it must.

@@ -95,9 +95,10 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
-        /// Ends each wave of paths before the next one begins, in place of new paths taking the slots of those that have ended; adaptive samples have whole waves in any case.
-        /// Never changes the picture: for measuring, and for techniques that look at a wave as a whole.
-        pub whole_waves: bool = false;
+        /// Ends each wave of paths before the next one begins; adaptive samples do in any case. Without, new paths take the slots of those that have ended, so that
+        /// passes are fewer, and samples reach the film pixel by pixel: a picture that is looked at before it is done lacks its last pixels. Never changes the
+        /// picture that is done.
+        pub whole_waves: bool = true;
         /// Counts what is fetched ([`PathCounters::fetches`](crate::techniques::path::PathCounters::fetches)), by other kernels. Never changes the picture: for measuring.
         pub count_fetches: bool = false;
         /// Work, in loop iterations, after which a submission begins no further place, as [`WalkOptions::work`](crate::walk::WalkOptions::work);
