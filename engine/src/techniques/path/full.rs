@@ -100,8 +100,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-FULL-WAVES",
     name: "waves that stay full: slots of paths that have ended take new samples, which reach the film in order",
     role: Role::PartOf("BG-3"),
-    limits: "Off by default, being slower on software drivers (`path-stages`); samples reach the film pixel by pixel, so that a picture before its end lacks its last pixels. Samples wait for the longest path before \
-             them, eight results a slot; adaptive samples, photon mapping and virtual lights have whole waves.",
+    limits: "Off by default, being slower on software drivers (`path-stages`); samples reach the film pixel by pixel, so that a picture before its end lacks its \
+             last pixels, and wait for the longest path before them; adaptive samples, photon mapping and virtual lights have whole waves.",
     sources: &[sources::NOVAK_2010.whole()],
     shaders: &[
         "shaders/techniques/path/path_refill.comp",
