@@ -239,12 +239,9 @@ impl VirtualLights {
     /// that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         let (done, each) = (self.eye.samples_done(), self.settings.samples_per_pass);
-        if done >= samples {
+        let Some([pass, end]) = self.eye.pass_towards(samples, each) else {
             return Ok(None);
-        }
-        // Whatever the target of each call, a pass has its samples.
-        let pass = done / each;
-        let end = (pass + 1).saturating_mul(each).min(samples);
+        };
         if let Some(lights) = &mut self.lights
             && lights.count.is_none()
         {
@@ -292,7 +289,7 @@ impl VirtualLights {
                 self.counts.gather.connections += counts.connections;
                 self.counts.gather.shadow_rays += counts.shadow_rays;
             }
-            if self.eye.samples_done().is_multiple_of(each) && self.eye.samples_done() > done {
+            if self.eye.has_ended_pass(done, each) {
                 lights.count = None;
             }
         }

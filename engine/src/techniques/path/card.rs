@@ -33,10 +33,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     refusals: |_| Vec::new(),
     settings: SettingsDecl::of::<PathTracerSettings>(),
     variants: &[
-        Variant {
-            name: "defaults",
-            settings: || serde_json::json!({}),
-        },
+        Variant::DEFAULTS,
         Variant {
             name: "independent samples",
             settings: || serde_json::json!({ "sampler": "pcg" }),

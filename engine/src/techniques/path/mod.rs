@@ -358,6 +358,19 @@ impl PathTracer {
         Ok(adaptive.next_wave(&self.cursor, &self.film, slots))
     }
 
+    /// Where passes have `each` samples per pixel, whatever the target of each call: which one is under way towards `samples`, and with how many samples it ends,
+    /// or this call with it; `None` when all are there.
+    pub(crate) fn pass_towards(&self, samples: u32, each: u32) -> Option<[u32; 2]> {
+        let done = self.samples_done();
+        let pass = done / each;
+        (done < samples).then(|| [pass, (pass + 1).saturating_mul(each).min(samples)])
+    }
+
+    /// Whether such a pass has ended since there were `before` samples per pixel.
+    pub(crate) fn has_ended_pass(&self, before: u32, each: u32) -> bool {
+        self.samples_done().is_multiple_of(each) && self.samples_done() > before
+    }
+
     /// What is there towards `samples` samples per pixel, after submissions that took `timings`.
     pub(crate) fn step_so_far(&self, timings: Vec<Timings>, samples: u32) -> Step {
         let [width, height] = self.film.size();

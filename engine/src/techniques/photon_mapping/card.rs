@@ -41,10 +41,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     path_set: PathSet::ALL,
     refusals,
     settings: SettingsDecl::of::<PhotonSettings>(),
-    variants: &[Variant {
-        name: "defaults",
-        settings: || serde_json::json!({}),
-    }],
+    variants: &[Variant::DEFAULTS],
     foresight: Foresight {
         law,
         ..Foresight::PLAIN

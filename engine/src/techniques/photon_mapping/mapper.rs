@@ -234,12 +234,9 @@ impl PhotonMapper {
     /// and should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         let (done, each) = (self.eye.samples_done(), self.settings.samples_per_pass);
-        if done >= samples {
+        let Some([pass, end]) = self.eye.pass_towards(samples, each) else {
             return Ok(None);
-        }
-        // Whatever the target of each call, a pass has its samples.
-        let pass = done / each;
-        let end = (pass + 1).saturating_mul(each).min(samples);
+        };
         let mut timings = Vec::new();
         let (kernel, watts) = (self.kernel(pass), self.watts());
         if let Some(photons) = &mut self.photons
@@ -301,8 +298,7 @@ impl PhotonMapper {
         let Some(mut step) = step else {
             return Ok(None);
         };
-        if self.eye.samples_done().is_multiple_of(each)
-            && self.eye.samples_done() > done
+        if self.eye.has_ended_pass(done, each)
             && let Some(photons) = &mut self.photons
         {
             photons.map = None;
