@@ -10,6 +10,7 @@
 //! [`mitsuba::scenes`]: crate::mitsuba::scenes
 //! [`film::z_test`]: fn@clerestory::film::z_test
 
+mod chosen;
 mod peer;
 mod race;
 mod report;
@@ -31,6 +32,7 @@ use clerestory::{Error, Result};
 use crate::experiments::watch::Watch;
 use crate::mitsuba::export;
 use crate::mitsuba::scenes::{ComparedScene, scenes};
+pub use chosen::Chosen;
 pub use peer::mitsuba_version;
 use peer::{Integrator, Peer, Request, Variant};
 use race::RaceSetup;
@@ -68,13 +70,6 @@ pub struct AgreementOptions {
     /// Folder for scenes and pictures, made if need be.
     #[serde(skip)]
     pub output: PathBuf,
-    /// The files of an earlier report without their suffix (`.md`, `.json`), for `keep`.
-    #[serde(skip)]
-    pub results: Option<PathBuf>,
-    /// What the report at `results` holds of this machine and these options stays in it. Without a selection of scenes only those are
-    /// compared that it does not hold.
-    #[serde(skip)]
-    pub keep: bool,
 }
 
 impl Default for AgreementOptions {
@@ -93,8 +88,6 @@ impl Default for AgreementOptions {
             adaptive: Adaptive::Off,
             python: std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from),
             output: "out/agreement".into(),
-            results: None,
-            keep: false,
         }
     }
 }
@@ -139,8 +132,9 @@ impl Fault {
     }
 }
 
-/// Compares all wanted scenes on a device, until `watch` says to stop, and gives `keep` the report after each. A scene of which Mitsuba makes a
-/// picture that is not finite is noted and left out.
+/// Compares all wanted scenes of a report that was begun, on a device, until `watch` says to stop, and gives `keep` the report after each. The scenes
+/// that it holds stay in it; without a selection only the others are compared. A scene of which Mitsuba makes a picture that is not finite is noted
+/// and left out.
 ///
 /// # Errors
 /// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the
@@ -148,21 +142,12 @@ impl Fault {
 /// fails after a stop request.
 pub fn run_with(
     gpu: &Gpu,
-    options: &AgreementOptions,
+    mut report: AgreementReport,
     watch: &dyn Watch,
     keep: &mut dyn FnMut(&AgreementReport) -> Result<()>,
 ) -> Result<AgreementReport> {
+    let options = &report.options.clone();
     let wanted = selected(options)?;
-    let machine = Machine::read(gpu.caps(), &format!("mitsuba {}", mitsuba_version(&options.python)?));
-    let mut report = AgreementReport {
-        options: options.clone(),
-        scenes: Vec::new(),
-        uncompared: Vec::new(),
-        machine,
-    };
-    if let Some(prefix) = options.results.as_ref().filter(|_| options.keep) {
-        report.scenes = AgreementReport::kept(prefix, &report.machine, options);
-    }
     let order: Vec<&str> = scenes()?.iter().map(|one| one.name).collect();
     let place = |name: &str| order.iter().position(|known| *known == name);
     for (done, one) in wanted.iter().enumerate() {
@@ -338,7 +323,7 @@ fn compare_scene(
     let blocks = z_test(&a_block, &a_block_var, &b_block, &b_block_var, SIGNIFICANCE)?;
     let errors = compare(&ours, &reference, &CompareOptions::default())?;
 
-    let mut race = None;
+    let (mut race, mut chosen) = (None, None);
     if options.timing_rounds > 0 {
         let has_llvm = theirs.variant == Variant::Llvm.name();
         if !has_llvm {
@@ -358,6 +343,9 @@ fn compare_scene(
             reference: b,
         };
         race = race::run(&setup, options, watch)?;
+        if let Some(race) = &race {
+            chosen = chosen::run(gpu, &one.scene, race, &reference, options, watch)?;
+        }
     }
     Ok(SceneAgreement {
         name: one.name.into(),
@@ -372,6 +360,7 @@ fn compare_scene(
         blocks,
         non_finite: non_finite.total(),
         race,
+        chosen,
     })
 }
 

@@ -55,12 +55,12 @@ impl Subject {
         matches!(self, Self::Technique { info, .. } if !matches!(info.bias, Bias::Unbiased))
     }
 
-    /// A technique's subjects: one for each sampler that its setting `sampler` offers; those with a bias, which are not judged by their noise,
-    /// have their default sampler alone. Cards of a host's own are as good as the engine's.
+    /// A technique's subjects: one for each sampler that its setting `sampler` offers; those with a bias, which are not judged by their noise, and those
+    /// whose pictures hold a part of the light alone, have their default sampler alone. Cards of a host's own are as good as the engine's.
     pub fn of(info: &'static Card) -> Vec<Self> {
         let infos = info.settings.infos();
         match infos.iter().find(|setting| setting.name == "sampler") {
-            Some(setting) if matches!(info.bias, Bias::Unbiased) => {
+            Some(setting) if matches!(info.bias, Bias::Unbiased) && info.path_set == PathSet::ALL => {
                 let subject = |sampler: &&'static str| Self::Technique {
                     info,
                     sampler: Some(*sampler),

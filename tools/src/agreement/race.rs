@@ -93,7 +93,7 @@ impl Contender {
     }
 
     /// Relative standard error of the seconds to an error, by that of the relative MSE and, where it is known, that of the seconds.
-    fn uncertainty(&self) -> f64 {
+    pub(super) fn uncertainty(&self) -> f64 {
         let seconds_error = self.seconds_error.unwrap_or(0.0);
         (self.relative_mse_error / self.relative_mse).hypot(seconds_error / self.seconds)
     }
@@ -217,6 +217,17 @@ impl Race {
             return name;
         }
         format!("{name} (LLVM variant not measured)")
+    }
+
+    /// Relative MSE of our best contender over the least of Mitsuba's, and its standard error: at equal samples, whatever they cost.
+    pub fn error_at_equal_samples(&self) -> [f64; 2] {
+        let ours = &self.contenders[self.against_best.ours];
+        let theirs = self.contenders.iter().filter(|one| !one.is_ours());
+        let least = theirs.min_by(|a, b| a.relative_mse.total_cmp(&b.relative_mse));
+        let theirs = least.unwrap_or(&self.contenders[self.against_best.theirs]);
+        let ratio = ours.relative_mse / theirs.relative_mse;
+        let part = |one: &Contender| one.relative_mse_error / one.relative_mse;
+        [ratio, ratio * part(ours).hypot(part(theirs))]
     }
 
     /// The two of a comparison, ours first.
@@ -441,6 +452,10 @@ pub(super) mod tests {
         assert!((best.ratio_error - 0.5 * 0.05 * 2.0f64.sqrt()).abs() < 1e-15);
         assert_eq!(race.against_scalar.ratio, 3.0);
         assert_eq!(race.pair(&best)[1].sampler, "independent");
+        // Beside the least error, which is another contender's, with 3 % on either side.
+        let [samples, error] = race.error_at_equal_samples();
+        assert_eq!(samples, 0.5 / 0.8);
+        assert!((error - samples * 0.03 * 2.0f64.sqrt()).abs() < 1e-15);
     }
 
     #[test]

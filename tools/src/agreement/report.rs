@@ -5,13 +5,14 @@ use std::path::Path;
 
 use clerestory::film::ZTest;
 use clerestory::film::z_test::{ACCEPTED_FRACTION, Verdict};
-use clerestory::gpu::Caps;
+use clerestory::gpu::Gpu;
 use clerestory::input::read_text;
 use clerestory::techniques::path::Adaptive;
 use clerestory::{Error, Result};
 
-use super::AgreementOptions;
+use super::chosen::Chosen;
 use super::race::{Contender, EqualError, Race};
+use super::{AgreementOptions, mitsuba_version};
 use crate::machine;
 
 /// Most bytes of an earlier report.
@@ -33,14 +34,15 @@ pub struct Machine {
 }
 
 impl Machine {
-    pub(super) fn read(caps: &Caps, mitsuba: &str) -> Self {
-        Self {
+    fn read(gpu: &Gpu, options: &AgreementOptions) -> Result<Self> {
+        let caps = gpu.caps();
+        Ok(Self {
             processor: machine::processor(),
             threads: machine::threads(),
             device: caps.device.clone(),
             driver: caps.driver.clone(),
-            mitsuba: mitsuba.into(),
-        }
+            mitsuba: format!("mitsuba {}", mitsuba_version(&options.python)?),
+        })
     }
 }
 
@@ -71,6 +73,9 @@ pub struct SceneAgreement {
     pub non_finite: u64,
     /// Both renderers' time to equal error; `None` where nothing was timed and where pictures have no noise.
     pub race: Option<Race>,
+    /// What the planner chooses for the error of our best picture; `None` where nothing was raced and in reports of earlier versions.
+    #[serde(default)]
+    pub chosen: Option<Chosen>,
 }
 
 impl SceneAgreement {
@@ -156,9 +161,22 @@ pub struct AgreementReport {
 }
 
 impl AgreementReport {
-    /// The scenes of the report at `prefix` that were compared on this machine with these options, whatever their selection; none where
-    /// there is no such report.
-    pub(super) fn kept(prefix: &Path, machine: &Machine, options: &AgreementOptions) -> Vec<SceneAgreement> {
+    /// A report without scenes, of this machine.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] where the options' Python cannot be run or has no Mitsuba.
+    pub fn begin(gpu: &Gpu, options: &AgreementOptions) -> Result<Self> {
+        Ok(Self {
+            machine: Machine::read(gpu, options)?,
+            options: options.clone(),
+            scenes: Vec::new(),
+            uncompared: Vec::new(),
+        })
+    }
+
+    /// The scenes of the report at `prefix` (its files without their endings) that were compared on this machine with these options, whatever their
+    /// selection; none where there is no such report.
+    pub fn kept(prefix: &Path, machine: &Machine, options: &AgreementOptions) -> Vec<SceneAgreement> {
         let text = read_text(&prefix.with_extension("json"), MOST_BYTES).unwrap_or_default();
         let same = |report: &Self| {
             let of_all = |options: &AgreementOptions| {
@@ -446,6 +464,7 @@ pub(crate) mod tests {
             relative_bias: -0.001,
             non_finite: 0,
             race,
+            chosen: None,
         };
         AgreementReport {
             machine: Machine {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use clerestory::techniques::path;
-use clerestory_tools::agreement::{AgreementOptions, run_with};
+use clerestory_tools::agreement::{AgreementOptions, AgreementReport, run_with};
 use clerestory_tools::experiments::watch::Watch;
 use clerestory_tools::mitsuba::scenes::scenes;
 use clerestory_tools::page::Block;
@@ -119,8 +119,6 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         },
         python: arguments.python.clone().unwrap_or(defaults.python),
         output: arguments.output.clone(),
-        results: arguments.results.clone(),
-        keep: arguments.keep,
     };
     options.check()?;
     let mut inputs = Inputs::of(&arguments.python);
@@ -135,8 +133,12 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
         None => None,
     };
     let gpu = arguments.device.open()?;
+    let mut begun = AgreementReport::begin(&gpu, &options)?;
+    if let Some(prefix) = arguments.results.as_ref().filter(|_| arguments.keep) {
+        begun.scenes = AgreementReport::kept(prefix, &begun.machine, &options);
+    }
     let bar = Bar::start()?;
-    let report = run_with(&gpu, &options, &bar, &mut |report| {
+    let report = run_with(&gpu, begun, &bar, &mut |report| {
         if let Some(results) = &mut results {
             results.write(&report.texts()?.map(String::into_bytes));
         }

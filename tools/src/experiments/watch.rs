@@ -1,6 +1,7 @@
 //! Who watches an experiment run, and may stop it.
 
-use clerestory::render::Progress;
+use clerestory::Result;
+use clerestory::render::{Progress, RenderOptions, Rendered, Renderer};
 
 /// Sees an experiment's progress and decides whether it goes on.
 pub trait Watch {
@@ -28,4 +29,19 @@ impl Watch for Unwatched {
     fn stopped(&self) -> bool {
         false
     }
+}
+
+/// A picture; `None` when it was stopped.
+///
+/// # Errors
+/// Those of techniques.
+pub fn render(renderer: &Renderer, options: &RenderOptions, watch: &dyn Watch) -> Result<Option<Rendered>> {
+    let mut rendering = renderer.start(options)?;
+    while let Some(progress) = rendering.step()? {
+        watch.step(progress);
+        if watch.stopped() {
+            return Ok(None);
+        }
+    }
+    rendering.finish().map(Some)
 }

@@ -95,6 +95,7 @@ macro_rules! measures {
 
 measures! {
     on_device "absorption" media::absorption;
+    on_device "adaptive-choice" rendering::adaptive_choice;
     on_device "alpha" surfaces::alpha;
     on_device "automatic-choice" rendering::automatic_choice;
     on_device "barriers" device::barriers;

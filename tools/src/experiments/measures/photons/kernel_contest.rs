@@ -6,9 +6,9 @@ use clerestory::{Result, scene};
 use serde_json::{Value, json};
 
 use crate::experiments::measures::Context;
-use crate::experiments::measures::rendering::technique_choice::render;
 use crate::experiments::reference::SEED;
 use crate::experiments::unbiased;
+use crate::experiments::watch::render;
 
 /// Pixels on a side; in a smoke run, also the samples per pixel of references.
 const SIDE: u32 = 20;

@@ -8,16 +8,18 @@ use clerestory::gpu::Gpu;
 use clerestory::plan::{Goal, plan};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Result, scene};
+use serde_json::{Value, json};
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
 use crate::experiments::unbiased;
+use crate::experiments::watch::render;
 
-use super::technique_choice::{FACTOR, FIRST_SEED, REFERENCE_SEED, render};
+use super::technique_choice::{FACTOR, FIRST_SEED, REFERENCE_SEED};
 
 /// Scenes with an error (root of the relative MSE) or a time (seconds) to keep; twenty have an error. None of them had a part in the making of the planner.
-const PAIRS: [(&str, Asked); 22] = [
+pub(super) const PAIRS: [(&str, Asked); 22] = [
     ("builtin:atrium", Asked::Error(0.1)),
     ("builtin:box-room?mirror=no", Asked::Error(0.1)),
     ("builtin:atrium", Asked::Seconds(4.0)),
@@ -60,14 +62,14 @@ const GOALS: ((u32, u32), (u32, u32)) = ((64, 16_384), (8, 512));
 const REFERENCE_SAMPLES: u32 = 25;
 const REFERENCE_SHARE: f64 = 0.1;
 /// Goals of a smoke run, one of each kind.
-const SMOKE_PAIRS: [(&str, Asked); 2] = [
+pub(super) const SMOKE_PAIRS: [(&str, Asked); 2] = [
     ("builtin:box-room", Asked::Error(0.5)),
     ("builtin:box-room", Asked::Seconds(0.5)),
 ];
 
 /// What is asked of the planner.
 #[derive(Clone, Copy)]
-enum Asked {
+pub(super) enum Asked {
     Error(f64),
     Seconds(f64),
 }
@@ -98,7 +100,8 @@ pub struct Found {
     goals: Vec<Aimed>,
 }
 
-const OF_GOALS: &[Criterion<Aimed>] = &[
+/// Of every goal.
+pub(super) const OF_GOALS: &[Criterion<Aimed>] = &[
     Criterion::all(
         "errors are those asked for: the median of their ratios over all scenes and seeds",
         Bound::Between(MEDIAN[0], MEDIAN[1]),
@@ -148,13 +151,15 @@ const OF_GOALS: &[Criterion<Aimed>] = &[
         |row: &Aimed| Measured::exact(shares_of_long(row).fold(0.0, f64::max)),
     )
     .among(|row| shares_of_long(row).next().is_some()),
-    Criterion::each(
-        "no more time is taken than was asked for, less is no fault: seconds over those asked for",
-        Bound::AtMost(FACTOR),
-        |row: &Aimed| (&row.seconds.scaled(1.0 / row.time.unwrap_or(f64::INFINITY))).into(),
-    )
-    .among(|row| row.time.is_some()),
 ];
+
+/// Of a time to keep.
+const OF_TIMES: &[Criterion<Aimed>] = &[Criterion::each(
+    "no more time is taken than was asked for, less is no fault: seconds over those asked for",
+    Bound::AtMost(FACTOR),
+    |row: &Aimed| (&row.seconds.scaled(1.0 / row.time.unwrap_or(f64::INFINITY))).into(),
+)
+.among(|row| row.time.is_some())];
 
 /// The pilots' shares of all time, pilots' and picture's, where that is long.
 fn shares_of_long(row: &Aimed) -> impl Iterator<Item = f64> {
@@ -184,27 +189,38 @@ impl Study for Found {
                 &gpu,
                 pairs,
                 |(address, _)| (*address).into(),
-                |(address, asked)| Ok(goal(context, &gpu, address, *asked)?.into_iter().collect()),
+                |(address, asked)| goal(context, &gpu, address, *asked, json!({})),
             )?,
         })
     }
 
     fn findings(&self) -> Findings {
-        let ratios = self.goals.iter().map(|row| row.ratio.measured());
-        Findings::of(&self.goals, OF_GOALS)
-            .note(
-                "Errors: root of the relative MSE against a reference of a seed of its own, whose variance is subtracted. Seconds are those of pilots \
-                 and picture.",
-            )
-            .note(format!(
-                "Each goal is chosen for {CHOICES} times, with seeds of their own for pilots and picture."
-            ))
-            .headline("error over the asked or predicted one, geometric mean", geometric_mean(ratios))
+        found(&self.goals).judged(&self.goals, OF_TIMES)
     }
 }
 
-/// Whether an error or a time is kept; `None` when it was stopped.
-fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result<Option<Aimed>> {
+/// Goals with the verdicts on all of them.
+pub(super) fn found(goals: &[Aimed]) -> Findings {
+    let ratios = goals.iter().map(|row| row.ratio.measured());
+    Findings::of(goals, OF_GOALS)
+        .note(
+            "Errors: root of the relative MSE against a reference of a seed of its own, whose variance is subtracted. Seconds are those of pilots \
+             and picture.",
+        )
+        .note(format!(
+            "Each goal is chosen for {CHOICES} times, with seeds of their own for pilots and picture."
+        ))
+        .headline("error over the asked or predicted one, geometric mean", geometric_mean(ratios))
+}
+
+/// Whether an error or a time is kept with the path tracer's settings at hand; nothing when it was stopped.
+pub(super) fn goal(
+    context: &Context<'_>,
+    gpu: &Gpu,
+    address: &str,
+    asked: Asked,
+    settings: Value,
+) -> Result<Vec<Aimed>> {
     let watch = context.watch;
     let (full, smoke) = GOALS;
     let (side, most_reference_spp) = context.pick(full, smoke);
@@ -212,6 +228,7 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
     let base = RenderOptions {
         technique: Some("path".into()),
         size: [side; 2],
+        settings: settings.into(),
         ..RenderOptions::default()
     };
     let (error, seconds) = match asked {
@@ -225,7 +242,7 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
     // Kernels are compiled, as they are from the second picture of a user on.
     let first = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
     if render(&renderer, &first.options(&base), watch)?.is_none() {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let of_reference = RenderOptions {
         spp: first
@@ -234,14 +251,14 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
             .saturating_mul(REFERENCE_SAMPLES)
             .min(most_reference_spp),
         seed: REFERENCE_SEED,
-        settings: serde_json::json!({ "sampler": "pcg" }).into(),
+        settings: json!({ "sampler": "pcg" }).into(),
         ..base.clone()
     };
     let Some(reference) = render(&renderer, &of_reference, watch)? else {
-        return Ok(None);
+        return Ok(Vec::new());
     };
     let mut of_choices: Vec<[f64; 10]> = Vec::new();
-    let mut settings = String::new();
+    let mut variant = String::new();
     for choice in 1..=CHOICES {
         let base = RenderOptions {
             seed: FIRST_SEED + 100 * choice,
@@ -251,7 +268,7 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
         let plan = plan(&renderer, &base, goal, &mut || !watch.stopped())?;
         let planned = start.elapsed().as_secs_f64();
         let Some(rendered) = render(&renderer, &plan.options(&base), watch)? else {
-            return Ok(None);
+            return Ok(Vec::new());
         };
         let chosen = plan.choice();
         let squared = unbiased::measure(&rendered.picture, &reference.picture)?;
@@ -271,7 +288,7 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
             f64::from(chosen.spp),
             squared.reference_relative_error / squared.relative_mse,
         ]);
-        settings = chosen.variant.into();
+        variant = chosen.variant.into();
     }
     let [
         predicted,
@@ -285,7 +302,7 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
         samples,
         reference,
     ] = Repeats::by_part(&of_choices);
-    Ok(Some(Aimed {
+    Ok(vec![Aimed {
         scene: short_name(address).into(),
         asked: error,
         time: seconds,
@@ -297,8 +314,8 @@ fn goal(context: &Context<'_>, gpu: &Gpu, address: &str, asked: Asked) -> Result
         predicted_seconds,
         seconds: all_seconds,
         pilots,
-        settings,
+        settings: variant,
         samples,
         reference,
-    }))
+    }])
 }

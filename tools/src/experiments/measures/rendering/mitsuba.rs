@@ -5,7 +5,7 @@
 //! experiment's folder.
 
 use clerestory::film::z_test::SIGNIFICANCE;
-use clerestory::{Error, Result};
+use clerestory::{Error, Result, atomic};
 
 use crate::agreement::{
     AgreementOptions, AgreementReport, BIAS_Z_MAX, PYTHON_VARIABLE, SceneAgreement, Uncompared, mitsuba_version,
@@ -13,8 +13,10 @@ use crate::agreement::{
 };
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, geometric_mean, rows};
 use crate::experiments::jackknife;
+use crate::experiments::kept_rows::KeptRows;
 use crate::experiments::measures::Context;
 use crate::experiments::table::Table;
+use crate::mitsuba::scenes::scenes;
 
 /// How to get what is missing.
 const INSTALL: &str = "To measure: `python3 -m venv ~/mitsuba && ~/mitsuba/bin/pip install mitsuba==3.9.1 numpy`, then \
@@ -56,6 +58,13 @@ rows! {
         freedom: Option<f64> = "its degrees of freedom",
         processor: Option<f64> = "ratio of processor time",
         scalar: Option<f64> = "ratio to its scalar variant",
+        samples: Option<f64> = "relative MSE over that of its best sampler at equal samples",
+        samples_error: Option<f64> = "standard error of that",
+        chosen: Option<String> = "technique chosen for the error",
+        chosen_seconds: Option<f64> = "its picture's time (s)",
+        pilots: Option<f64> = "its pilots' time (s)",
+        reached: Option<f64> = "relative MSE that it reaches",
+        chosen_ratio: Option<f64> = "ratio by the chosen technique",
         unraced: Option<String> = "not raced because",
     }
 }
@@ -100,13 +109,54 @@ const OF_AGREEMENT: &[Criterion<Agreement>] = &[
     .needs(MITSUBA),
 ];
 
-const OF_TIMES: &[Criterion<Time>] = &[Criterion::each(
-    "the ratio of times to equal error is above 1",
-    Bound::AtLeast(1.0),
-    Time::ratio,
-)
-.because("with 95 % by Student's t; a scene without an error to reach gives no ratio, and fails")
-.needs(MITSUBA)];
+const OF_TIMES: &[Criterion<Time>] = &[
+    Criterion::each(
+        "the ratio of times to equal error is above 1",
+        Bound::AtLeast(1.0),
+        Time::ratio,
+    )
+    .because("with 95 % by Student's t; a scene without an error to reach gives no ratio, and fails")
+    .needs(MITSUBA),
+    Criterion::each("no scene is below half of Mitsuba's best", Bound::AtLeast(0.5), Time::ratio)
+        .because("what a user loses at most on a scene of his own; with 95 %")
+        .needs(MITSUBA),
+    Criterion::all(
+        "beside Mitsuba's best by the path tracer alone, geometric mean of the ratios",
+        Bound::AtLeast(0.75),
+        |rows: &[&Time]| geometric_mean(rows.iter().map(|row| row.ratio())),
+    )
+    .needs(MITSUBA),
+    Criterion::all(
+        "beside Mitsuba's best with the technique chosen for the error, without its pilots, geometric mean of the ratios",
+        Bound::AtLeast(1.0),
+        |rows: &[&Time]| geometric_mean(rows.iter().map(|row| row.chosen_ratio.unwrap_or(f64::NAN).into())),
+    )
+    .needs(MITSUBA),
+    Criterion::all(
+        "beside Mitsuba's scalar variant, geometric mean of the ratios",
+        Bound::AtLeast(1.5),
+        |rows: &[&Time]| geometric_mean(rows.iter().map(|row| row.scalar.unwrap_or(f64::NAN).into())),
+    )
+    .needs(MITSUBA),
+    Criterion::each(
+        "at equal samples the relative MSE is that of Mitsuba's best sampler",
+        Bound::AtMost(1.05),
+        |row: &Time| {
+            let value = row.samples.unwrap_or(f64::NAN);
+            let margin = NORMAL_95 * row.samples_error.unwrap_or(0.0);
+            Measured {
+                value,
+                low: value - margin,
+                high: value + margin,
+            }
+        },
+    )
+    .because("with 95 %, by the spread of both renderers' pictures")
+    .needs(MITSUBA),
+];
+
+/// Standard deviations to either side of the mean within which 95 % of normal numbers are.
+const NORMAL_95: f64 = 1.96;
 
 /// Share of scenes that are called for another look though both renderers agree.
 const CALLS_BY_CHANCE: f64 = 0.02;
@@ -162,6 +212,8 @@ impl Time {
         };
         let best = &race.against_best;
         let [ours, theirs] = race.pair(best);
+        let [samples, samples_error] = race.error_at_equal_samples();
+        let chosen = scene.chosen.as_ref();
         // Seconds vary from round to round, or from picture to picture where there is one round.
         let timed = match options.timing_rounds {
             ..=1 => options.timing_pictures,
@@ -187,6 +239,16 @@ impl Time {
             freedom: finite(degrees_of_freedom(parts.as_flattened())),
             processor: best.cpu_ratio.and_then(finite),
             scalar: finite(race.against_scalar.ratio),
+            samples: finite(samples),
+            samples_error: finite(samples_error),
+            chosen: chosen.map(|one| match &*one.variant {
+                "" => one.technique.clone(),
+                variant => format!("{} ({variant})", one.technique),
+            }),
+            chosen_seconds: chosen.and_then(|one| finite(one.seconds)),
+            pilots: chosen.and_then(|one| finite(one.pilot_seconds)),
+            reached: chosen.and_then(|one| finite(one.relative_mse)),
+            chosen_ratio: chosen.and_then(|one| finite(one.ratio)),
             unraced: None,
         }
     }
@@ -258,7 +320,10 @@ impl Study for Found {
             Err(cause) => without_mitsuba(cause, std::env::var_os(PYTHON_VARIABLE).is_some()),
             Ok(version) => {
                 context.watch.note(&format!("Mitsuba {version}"));
-                let report = run_with(&(context.gpu)()?, &options, context.watch, &mut |_| Ok(()))?;
+                let report = compared(context, &options)?;
+                for (ending, text) in ["json", "md"].into_iter().zip(report.texts()?) {
+                    atomic::write(&context.file(&format!("agreement.{ending}"))?, text.as_bytes())?;
+                }
                 Ok(Self::of(&report))
             }
         }
@@ -286,10 +351,38 @@ impl Study for Found {
     }
 }
 
+/// Compares scene by scene. Scenes take minutes each, and are kept as soon as they are there, so that a run that was stopped goes on; smoke runs keep
+/// nothing.
+fn compared(context: &Context<'_>, options: &AgreementOptions) -> Result<AgreementReport> {
+    let gpu = (context.gpu)()?;
+    let mut report = AgreementReport::begin(&gpu, options)?;
+    if context.smoke {
+        return run_with(&gpu, report, context.watch, &mut |_| Ok(()));
+    }
+    let device = format!("{}, {}", gpu.caps().device, gpu.caps().driver);
+    let mut kept = KeptRows::open(context.folder, &device, &report.machine.mitsuba)?;
+    let names: Vec<&str> = scenes()?.iter().map(|scene| scene.name).collect();
+    for (place, name) in names.iter().enumerate() {
+        report
+            .scenes
+            .extend(kept.get::<SceneAgreement>(place, name).unwrap_or_default());
+    }
+    let mut known: Vec<String> = report.scenes.iter().map(|scene| scene.name.clone()).collect();
+    run_with(&gpu, report, context.watch, &mut |report| {
+        for (place, name) in names.iter().enumerate() {
+            let fresh = report.scenes.iter().find(|scene| scene.name == *name);
+            if let Some(scene) = fresh.filter(|_| !known.iter().any(|one| one == name)) {
+                kept.add(place, name, std::slice::from_ref(scene))?;
+                known.push(scene.name.clone());
+            }
+        }
+        Ok(())
+    })
+}
+
 fn options(context: &Context<'_>) -> AgreementOptions {
     let all = AgreementOptions {
         output: context.folder.join("scenes"),
-        results: Some(context.folder.join("agreement")),
         ..AgreementOptions::default()
     };
     if !context.smoke {
@@ -334,7 +427,7 @@ fn finite(number: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::agreement::made_up;
+    use crate::agreement::{Chosen, made_up};
     use crate::experiments::findings::Verdict;
     use crate::experiments::watch::Unwatched;
 
@@ -372,6 +465,28 @@ mod tests {
         assert!(README.contains(install), "{install}");
     }
 
+    fn made_up_chosen() -> Chosen {
+        Chosen {
+            technique: "photon".into(),
+            variant: String::new(),
+            asked: 0.5f64.sqrt(),
+            samples: 16,
+            pilot_seconds: 1.0,
+            seconds: 1.0,
+            relative_mse: 0.4,
+            ratio: 1.2,
+            ratio_error: 0.1,
+        }
+    }
+
+    fn decided(verdict: &Verdict) -> Option<bool> {
+        match verdict {
+            Verdict::Holds => Some(true),
+            Verdict::Fails { .. } => Some(false),
+            _ => None,
+        }
+    }
+
     #[test]
     fn a_report_becomes_sound_tables() {
         let report = made_up();
@@ -391,9 +506,19 @@ mod tests {
             assert!(text.contains(part), "{part} in {text}");
         }
         let holds: Vec<bool> = verdicts.iter().map(|judged| judged.verdict == Verdict::Holds).collect();
-        // Faster to equal error is Mitsuba in this race.
-        assert_eq!(holds, [true, true, true, false], "{verdicts:?}");
+        // Faster to equal error is Mitsuba in this race; the scene that was not raced fails whatever is asked of races.
+        assert_eq!(holds, [[true; 3].as_slice(), &[false; 6]].concat(), "{verdicts:?}");
         assert_eq!((verdicts[3].rows, verdicts[3].failing), (2, 2));
+        let mut raced = AgreementReport {
+            scenes: report.scenes[..1].to_vec(),
+            ..report.clone()
+        };
+        raced.scenes[0].chosen = Some(made_up_chosen());
+        let Findings { verdicts, .. } = Found::of(&raced).findings();
+        let holds: Vec<Option<bool>> = verdicts[3..].iter().map(|judged| decided(&judged.verdict)).collect();
+        // A ratio of 0.5 ± 0.035, one of 1.2 by the technique that was chosen, 3 beside the scalar variant, and 0.625 of the error at equal samples.
+        let expected = [Some(false), None, Some(false), Some(true), Some(true), Some(true)];
+        assert_eq!(holds, expected, "{verdicts:?}");
         let untimed = AgreementReport {
             scenes: report.scenes[1..].to_vec(),
             options: AgreementOptions {

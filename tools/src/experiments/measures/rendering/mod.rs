@@ -1,6 +1,7 @@
 //! Whole pictures: whether they are what was asked for, how their lights are chosen, what many lamps cost, what they cost and where, how they stop, their sums and files, and agreement with
 //! Mitsuba 3 and with Cycles.
 
+pub mod adaptive_choice;
 pub mod automatic_choice;
 pub mod cycles;
 pub mod light_choice;

@@ -15,7 +15,7 @@ use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, g
 use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
 use crate::experiments::unbiased;
-use crate::experiments::watch::Watch;
+use crate::experiments::watch::render;
 
 /// A scene, what is asked for, and the technique that is expected to win.
 struct Contest {
@@ -193,21 +193,6 @@ impl Study for Found {
                 geometric_mean(self.contests.iter().filter_map(lead)),
             )
     }
-}
-
-/// A picture; `None` when it was stopped.
-///
-/// # Errors
-/// Those of techniques.
-pub fn render(renderer: &Renderer, options: &RenderOptions, watch: &dyn Watch) -> Result<Option<Rendered>> {
-    let mut rendering = renderer.start(options)?;
-    while let Some(progress) = rendering.step()? {
-        watch.step(progress);
-        if watch.stopped() {
-            return Ok(None);
-        }
-    }
-    rendering.finish().map(Some)
 }
 
 /// Root of the relative MSE, and seconds of the picture.
