@@ -35,16 +35,16 @@ fn stages_fetch_what_is_counted() {
     with_gpu(|gpu| {
         // Every path meets a lamp at once, and ends there.
         let box_of_lamps = builtin("builtin:furnace-box?rho=0.5&emission=0.1");
-        for whole_waves in [false, true] {
+        for full_waves in [true, false] {
             let settings = PathTracerSettings {
-                whole_waves,
+                full_waves,
                 ..paths("emitted")
             };
             let counters = counted(gpu, &box_of_lamps, &settings);
             let (rays, fetches) = (counters.extend_rays, counters.fetches);
             assert_eq!((rays, counters.shadow_rays), (16 * 16 * 4, 0));
             // A whole wave begins with a walk in each slot: its queue is not read in the first bounce.
-            let slots = u64::from(!whole_waves);
+            let slots = u64::from(full_waves);
             // Origin and direction of the ray.
             assert_eq!(fetches.texels[EXTEND], rays * (2 + slots));
             assert_eq!(fetches.bytes[EXTEND], rays * (2 * QUARTER + slots * WORD));
@@ -60,7 +60,7 @@ fn stages_fetch_what_is_counted() {
 fn diffuse_scenes_fetch_few_texels_a_segment() {
     with_gpu(|gpu| {
         let full = PathTracerSettings {
-            whole_waves: false,
+            full_waves: true,
             ..PathTracerSettings::default()
         };
         let counters = counted(gpu, &builtin("builtin:cornell-box"), &full);

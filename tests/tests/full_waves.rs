@@ -15,7 +15,7 @@ const SAMPLES: u32 = 9;
 
 fn whole() -> PathTracerSettings {
     PathTracerSettings {
-        whole_waves: true,
+        full_waves: false,
         aovs: true,
         ..PathTracerSettings::default()
     }
@@ -23,7 +23,7 @@ fn whole() -> PathTracerSettings {
 
 fn full(paths_in_flight: u32) -> PathTracerSettings {
     PathTracerSettings {
-        whole_waves: false,
+        full_waves: true,
         paths_in_flight,
         ..whole()
     }

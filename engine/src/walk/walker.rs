@@ -205,8 +205,8 @@ impl Walker {
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn begin_full(&mut self, key: WalkKey) -> Result<WaveInFlight> {
         let Some(turnover) = self.buffers.turnover().filter(|_| self.buffers.is_numbered()) else {
-            let cause = "is not enough: a wave that is kept full has a turnover, and numbers of its walks";
-            return Err(crate::Error::setting("buffers", "without", cause));
+            let cause = "needs memory for a wave that is kept full: a turnover, and numbers of its walks";
+            return Err(crate::Error::setting("wave", "full", cause));
         };
         turnover.free_all()?;
         let status = Status {
@@ -235,12 +235,19 @@ impl Walker {
     /// Lets the next submission of a wave that is kept full begin so many walks more. A submission that fails has lost them, and the wave with them.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for more walks than slots are free, and within a bounce ([`WaveInFlight::is_between_bounces`]).
+    /// [`Error::Setting`](crate::Error::Setting) for more walks than slots are free, within a bounce ([`WaveInFlight::is_between_bounces`]), and for memory that no
+    /// wave can be kept full in.
     pub fn refill(&self, wave: &mut WaveInFlight, walks: u32) -> Result<()> {
         let free = self.buffers.slots() - wave.status.active_count;
-        if walks > free || !wave.is_between_bounces() || self.buffers.turnover().is_none() {
-            let cause = format!("is not to be had: {free} slots of the wave are free, between two bounces");
-            return Err(crate::Error::setting("walks", walks, cause));
+        let refuse = |cause: String| Err(crate::Error::setting("walks", walks, cause));
+        if self.buffers.turnover().is_none() {
+            return refuse("needs a wave that was begun by begin_full".into());
+        }
+        if !wave.is_between_bounces() {
+            return refuse("may be asked for between two bounces alone".into());
+        }
+        if walks > free {
+            return refuse(format!("is more than the {free} free slots"));
         }
         if walks > 0 {
             wave.begins += walks;

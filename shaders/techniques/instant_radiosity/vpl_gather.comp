@@ -17,7 +17,6 @@ layout(local_size_x = 64) in;
 #include "transport/features.glsl"
 #include "walk/wave.glsl"
 #include "techniques/instant_radiosity/virtual_light.glsl"
-#include "techniques/photon_mapping/adjoint_ratio.glsl"
 #include "transport/arrival.glsl"
 #include "transport/edge_bound.glsl"
 #include "transport/path_set.glsl"
@@ -35,7 +34,7 @@ layout(push_constant, scalar) uniform Push {
     uint lights;
     float scale;         // one over the walks of the pass
     float edge_bound;    // of EDGE_BOUND
-    uint seed;
+    uint seed;           // of the pass
     uint first_place;
     uint goes_on;        // 1 for places that have stopped
 } push;
@@ -119,22 +118,22 @@ bool begin_receiver(uint slot, uint place, out Receiver r) {
     return r.throughput != vec3(0.0);
 }
 
-// Radiant intensity over power, with the cosine, that a virtual light sends along `out_direction`, 1/sr.
+// Radiant intensity over power, with the cosine, that a virtual light sends along `out_direction`, 1/sr: from the radiance that an eye path would find
+// there, whose shading normal faces that direction, so that virtual lights and eye paths have the same light of a surface.
 vec3 light_scattering(VirtualLight light, vec3 out_direction) {
     if (LAMBERT) {
         return light.surface * (INV_PI * max(dot(light.normal, out_direction), 0.0));
     }
-    Arrival a = arrival_at(Hit(0.0, light.surface.xy, light.triangle), light.direction, push.scene_lower, push.scene_upper);
-    a.bsdf.flags |= BSDF_IMPORTANCE;
+    Arrival a = arrival_at(Hit(0.0, light.surface.xy, light.triangle), -out_direction, push.scene_lower, push.scene_upper);
     ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
-    if (!sides_agree(frame.z, frame.outward, out_direction)) {
+    vec3 in_direction = -light.direction;
+    float cos_in = abs(dot(in_direction, a.surface.geometric_normal));
+    if (!sides_agree(frame.z, frame.outward, in_direction) || !(cos_in > 0.0)) {
         return vec3(0.0);
     }
-    vec3 scattered = bsdf_eval(a.bsdf, frame.wo, world_to_frame(frame, out_direction), LOBE_ALL);
-    if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
-        scattered *= adjoint_ratio(frame.z, a.surface.geometric_normal, a.wo, out_direction);
-    }
-    return scattered;
+    // Radiance over irradiance times the cosine out; the scattering function has the shading normal's cosine in, the irradiance the surface's own.
+    float cos_out = abs(dot(out_direction, a.surface.geometric_normal));
+    return bsdf_eval(a.bsdf, frame.wo, world_to_frame(frame, in_direction), LOBE_ALL) * (cos_out / cos_in);
 }
 
 // Radiance that the receiver scatters of a virtual light's, if nothing stands between, and the ray that tells.
@@ -188,9 +187,10 @@ void gather(Receiver r, inout GatherState at, out uint rays) {
         if (found != vec3(0.0)) {
             rays += at.cursor == INDEX_START ? 1u : 0u;
             if (HAS_ALPHA) {
-                // The way to the point stands for the path, of which a stage between knows no number.
+                // The point and the way to it stand for the path, of which a stage between knows no number: under an orthographic camera ways are equal.
+                uvec3 place = floatBitsToUint(r.arrival.surface.point.position);
                 uvec3 way = floatBitsToUint(r.arrival.wo);
-                candidate_key = uvec4(way, push.seed) + pcg4d(uvec4(at.light, r.bounce, push.lights, GATHER_SEED));
+                candidate_key = pcg4d(uvec4(place, push.seed)) + pcg4d(uvec4(way.x ^ at.light, way.y, way.z + r.bounce, GATHER_SEED));
             }
             Hit hit = no_hit(ray.t_max);
             at.cursor = any_hit(ray, at.cursor, hit);

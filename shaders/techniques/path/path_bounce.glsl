@@ -4,7 +4,7 @@
 
 #include "walk/wave.glsl"
 
-layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel and sample of its own: pixels have differing numbers of samples
+layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel and sample of its own: adaptive samples, or a wave that is kept full
 #define CLERESTORY_NUMBERED NUMBERED
 
 layout(push_constant, scalar) uniform Push {

@@ -6,7 +6,7 @@
 
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint SAMPLER_KIND = 0;  // SAMPLER_SOBOL, SAMPLER_PCG or SAMPLER_JOINT_SOBOL
-layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel and sample of its own: pixels have differing numbers of samples
+layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel and sample of its own: adaptive samples
 #define CLERESTORY_NUMBERED NUMBERED
 #define CLERESTORY_SAMPLER SAMPLER_KIND
 

@@ -156,14 +156,15 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     }
     bool deposits = STORES_LIGHTS ? arrival_has_rough_lobes(a) : arrival_has_diffuse_base(a);
     if (bounce >= push.first_deposit && deposits) {
-        WalkState landed = photon;
-        if (HAS_ALPHA) {
-            // Blended surfaces stop only that share of photons, but whoever meets them sees all of their light.
-            landed.throughput /= material_coverage(a.material, surface_base_color(a.material, s).a);
-        }
         if (STORES_LIGHTS) {
+            // Of a blended surface it keeps the share of those that the surface has stopped, since no shadow ray to it asks whether it is there.
             deposit_light(place, photon, hit, bounce, flags);
         } else {
+            WalkState landed = photon;
+            if (HAS_ALPHA) {
+                // Blended surfaces stop only that share of photons, but whoever meets them sees all of their light.
+                landed.throughput /= material_coverage(a.material, surface_base_color(a.material, s).a);
+            }
             deposit(slot, place, landed, s.point, a.facing, footprint, flags);
         }
     }

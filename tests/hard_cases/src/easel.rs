@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clerestory::film::picture::{RADIANCE, SAMPLES, VARIANCE};
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
+use clerestory::settings::Settings;
 use clerestory::techniques::{Bias, Card, Technique, View};
 use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
@@ -18,6 +19,9 @@ const SEED: u32 = 7;
 const PHOTON_TOLERANCE: f64 = 6.4;
 /// The same of techniques with a bias that have no photons.
 pub(crate) const OTHER_TOLERANCE: f64 = 0.05;
+
+/// Passes of a picture, where all pixels share the noise of one: enough for a variance of their means.
+pub(crate) const PASSES: u32 = 16;
 
 /// What the mean over a picture may be wrong by where so many photons light it.
 pub(crate) fn photon_tolerance(photons: f64) -> f64 {
@@ -33,6 +37,8 @@ pub struct Easel<'a> {
     pub info: &'static Card,
     settings: serde_json::Map<String, Value>,
     seed: u32,
+    /// Samples of a pass, where means over pictures are judged by those of their passes.
+    pass_samples: Option<u32>,
 }
 
 /// A finished picture.
@@ -52,6 +58,8 @@ pub struct Painted {
     pub counters: BTreeMap<&'static str, u64>,
     /// Relative error that the mean over the picture may have beside what its variance says; above 0 single pixels promise nothing.
     pub tolerance: f64,
+    /// Means over the picture in each pass, where all pixels share the noise of one: single pixels promise nothing then, and their variance says nothing of the mean.
+    pub passes: Vec<[f64; 3]>,
 }
 
 impl Painted {
@@ -82,6 +90,7 @@ impl<'a> Easel<'a> {
             info,
             settings,
             seed: SEED,
+            pass_samples: None,
         }
     }
 
@@ -116,6 +125,25 @@ impl<'a> Easel<'a> {
         }
     }
 
+    /// The same for pictures of so many samples. Where the technique has no bias and all pixels share the noise of a pass, they have [`PASSES`] of them.
+    ///
+    /// # Errors
+    /// Those of the technique's law, for settings that it does not know.
+    pub(crate) fn in_passes(&self, spp: u32) -> Result<Self> {
+        let mut easel = self.clone();
+        if self.has_bias() || !shares_noise(self.info, &self.settings())? {
+            return Ok(easel);
+        }
+        easel = easel.with("samples_per_pass", spp.div_ceil(PASSES));
+        let law = (self.info.foresight.law)(&easel.settings())?;
+        easel.pass_samples = Some(law.samples_a_pass);
+        Ok(easel)
+    }
+
+    fn settings(&self) -> Settings {
+        Value::Object(self.settings.clone()).into()
+    }
+
     /// Checks and uploads a scene.
     ///
     /// # Errors
@@ -148,8 +176,7 @@ impl<'a> Easel<'a> {
             seed: self.seed,
             aovs: false,
         };
-        let settings = Value::Object(self.settings.clone()).into();
-        self.info.prepare(self.gpu, uploaded, &view, &settings)
+        self.info.prepare(self.gpu, uploaded, &view, &self.settings())
     }
 
     /// Renders a picture through the scene's first camera.
@@ -157,10 +184,25 @@ impl<'a> Easel<'a> {
     /// # Errors
     /// As [`Easel::prepare`] and [`Technique::step`].
     pub fn paint(&self, scene: &Scene, size: [u32; 2], spp: u32) -> Result<Painted> {
-        let painted = finish(self.prepare(scene, size)?.as_mut(), spp)?;
+        let easel = self.in_passes(spp)?;
+        easel.finish(easel.prepare(scene, size)?.as_mut(), spp)
+    }
+
+    /// Renders to the end what was prepared by an easel of [`in_passes`](Self::in_passes), and reads the picture.
+    pub(crate) fn finish(&self, technique: &mut dyn Technique, spp: u32) -> Result<Painted> {
+        let mut passes = Vec::new();
+        let (mut before, mut sums) = (0, [0.0; 3]);
+        while let Some(each) = self.pass_samples.filter(|_| before < spp) {
+            let now = (before + each).min(spp);
+            let painted = finish(technique, now)?;
+            let sums_now = painted.mean().map(|(mean, _)| mean * f64::from(now));
+            passes.push([0, 1, 2].map(|c| (sums_now[c] - sums[c]) / f64::from(now - before)));
+            (before, sums) = (now, sums_now);
+        }
         Ok(Painted {
             tolerance: self.tolerance(spp),
-            ..painted
+            passes,
+            ..finish(technique, spp)?
         })
     }
 
@@ -207,5 +249,11 @@ pub fn finish(technique: &mut dyn Technique, spp: u32) -> Result<Painted> {
         spp,
         counters: technique.counters(),
         tolerance: 0.0,
+        passes: Vec::new(),
     })
+}
+
+/// Whether all pixels share the noise of a pass of a technique's.
+pub(crate) fn shares_noise(info: &Card, settings: &Settings) -> Result<bool> {
+    Ok((info.foresight.law)(settings)?.shares_noise)
 }

@@ -12,6 +12,28 @@ pub const FALSE_ALARM: f64 = 1e-6;
 pub(crate) const Z_MAX: f64 = 4.892;
 /// The same for a sum over pixels whose three channels may be one and the same: √3 times as much.
 const SUM_Z_MAX: f64 = 8.473;
+/// |t| of so many degrees of freedom that lies as far out as [`Z_MAX`] of a standard normal variable (D. L. Wallace, "Bounds on normal approximations to Student's
+/// and the chi-square distributions", 1959).
+fn t_max(degrees: f64) -> f64 {
+    let z = Z_MAX * (8.0 * degrees + 3.0) / (8.0 * degrees + 1.0);
+    (degrees * (z * z / degrees).exp_m1()).sqrt()
+}
+
+/// The mean over the picture, and the most of its noise, a channel: by the variance of its pixels, or by Student's t where they share the noise of a pass.
+fn mean_and_noise(painted: &Painted) -> [(f64, f64); 3] {
+    let (n, means) = (painted.passes.len() as f64, painted.mean());
+    [0, 1, 2].map(|c| {
+        let (mean, variance) = means[c];
+        if painted.passes.len() < 2 {
+            return (mean, Z_MAX * variance.sqrt());
+        }
+        let values = painted.passes.iter().map(|pass| pass[c]);
+        let centre = values.clone().sum::<f64>() / n;
+        let squares = values.map(|value| (value - centre).powi(2)).sum::<f64>();
+        (mean, t_max(n - 1.0) * (squares / (n * (n - 1.0))).sqrt())
+    })
+}
+
 /// Share of a picture's values that its z-test may reject where heavy tails explain it: 1 − [`ACCEPTED_FRACTION`](clerestory::film::z_test::ACCEPTED_FRACTION).
 const REJECTED_MAX: f64 = 1.0 - clerestory::film::z_test::ACCEPTED_FRACTION;
 
@@ -44,6 +66,11 @@ impl Figure {
     /// Whether it is good enough to pass.
     pub fn passes(&self) -> bool {
         self.measured <= self.bound
+    }
+
+    /// The picture or scene that it is of: what was measured, without the last word of it.
+    fn of(&self) -> &str {
+        self.what.rsplit_once(": ").map_or(&self.what, |(of, _)| of)
     }
 
     /// Whether it is at least as good as documented.
@@ -94,6 +121,13 @@ impl Judgement {
             let worse = (rank(figure), figure.excess()) >= (rank(worst), worst.excess());
             if worse { figure } else { worst }
         })
+    }
+
+    /// Whether another technique's values are wrong of every picture that these are wrong of.
+    pub(crate) fn errs_where(&self, other: &Self) -> bool {
+        let wrong = |figure: &&Figure| !figure.is_documented();
+        (self.figures.iter().filter(wrong))
+            .all(|figure| (other.figures.iter()).any(|same| same.of() == figure.of() && !same.passes()))
     }
 
     /// A value that has to stay at or below a bound.
@@ -206,7 +240,7 @@ impl Judgement {
     pub fn uniform(&mut self, what: &str, painted: &Painted, expected: [f64; 3]) -> Result<()> {
         self.mean(what, painted, expected, 0.0)?;
         let values: Vec<f32> = (0..painted.radiance.len()).map(|i| expected[i % 3] as f32).collect();
-        self.pixels(what, painted, &values, None)
+        self.pixels(what, painted, &values)
     }
 
     /// The mean over the picture is `expected` but for a relative bias of at most `allowed`, which has to be justified where it is stated.
@@ -235,11 +269,11 @@ impl Judgement {
                 cause: "has no values".into(),
             });
         }
-        for (channel, (mean, variance)) in painted.mean().into_iter().enumerate() {
+        for (channel, (mean, noise)) in mean_and_noise(painted).into_iter().enumerate() {
             let expected = expected[channel];
             let scale = if expected == 0.0 { 1.0 } else { expected };
             // The noise that a right picture has at most, beside the bias that is allowed.
-            let noise = Z_MAX * variance.sqrt() / scale + RELATIVE_DEVIATION_FLOOR;
+            let noise = noise / scale + RELATIVE_DEVIATION_FLOOR;
             let error = (mean - expected).abs() / scale;
             self.at_most_documented(
                 format!("{what}: relative error of the mean"),
@@ -254,32 +288,37 @@ impl Judgement {
     /// The mean over the picture is at most `limit`, but for noise.
     pub fn mean_at_most(&mut self, what: &str, painted: &Painted, limit: f64) {
         self.sound(what, painted);
-        let worst = painted
-            .mean()
-            .into_iter()
-            .map(|(mean, variance)| mean - Z_MAX * variance.sqrt());
+        let worst = mean_and_noise(painted).into_iter().map(|(mean, noise)| mean - noise);
         let limit = limit * (1.0 + painted.tolerance);
         self.at_most(format!("{what}: mean less its noise"), worst.fold(0.0, f64::max), limit);
     }
 
-    /// Pixels have the expectations `expected`, or those of an independent picture with the variance of its means; where the technique
-    /// has a bias, means over the picture have.
+    /// Pixels have the expectations `expected`, as [`same_expectations`](Self::same_expectations) has it.
     ///
     /// # Errors
     /// That of the z-test, for pictures of different sizes.
-    pub fn pixels(&mut self, what: &str, painted: &Painted, expected: &[f32], variance: Option<&[f32]>) -> Result<()> {
+    pub fn pixels(&mut self, what: &str, painted: &Painted, expected: &[f32]) -> Result<()> {
+        let exact = Painted {
+            radiance: expected.to_vec(),
+            variance: vec![0.0; expected.len()],
+            passes: Vec::new(),
+            ..painted.clone()
+        };
+        self.same_expectations(what, painted, &exact)
+    }
+
+    /// Pixels have the expectations of those of an independent picture; where the technique has a bias, or pixels share their noise, means over the picture have.
+    ///
+    /// # Errors
+    /// That of the z-test, for pictures of different sizes.
+    pub fn same_expectations(&mut self, what: &str, painted: &Painted, other: &Painted) -> Result<()> {
         self.sound(what, painted);
-        let none = vec![0.0; expected.len()];
-        let variance = variance.unwrap_or(&none);
-        if painted.tolerance > 0.0 {
-            let other = Painted {
-                radiance: expected.to_vec(),
-                variance: variance.to_vec(),
-                ..painted.clone()
-            };
-            for ((mean, variance), (expected, other_variance)) in painted.mean().into_iter().zip(other.mean()) {
+        if painted.tolerance > 0.0 || !painted.passes.is_empty() {
+            for ((mean, noise), (expected, other_noise)) in
+                mean_and_noise(painted).into_iter().zip(mean_and_noise(other))
+            {
                 let scale = if expected == 0.0 { 1.0 } else { expected };
-                let noise = Z_MAX * (variance + other_variance).sqrt() / scale + RELATIVE_DEVIATION_FLOOR;
+                let noise = noise.hypot(other_noise) / scale + RELATIVE_DEVIATION_FLOOR;
                 self.at_most(
                     format!("{what}: relative error of the mean"),
                     (mean - expected).abs() / scale,
@@ -288,7 +327,8 @@ impl Judgement {
             }
             return Ok(());
         }
-        let test = z_test(&painted.radiance, &painted.variance, expected, variance, SIGNIFICANCE)?;
+        let [a, b] = [painted, other];
+        let test = z_test(&a.radiance, &a.variance, &b.radiance, &b.variance, SIGNIFICANCE)?;
         self.at_most(
             format!("{what}: share of values that the z-test rejects"),
             1.0 - test.accepted_fraction,

@@ -1,17 +1,20 @@
 //! Runs cases on subjects and gives verdicts.
 
 use clerestory::gpu::Gpu;
+use clerestory::settings::Settings;
 use clerestory::techniques::{self, Bias, Card};
 use clerestory::transport::PathSet;
 use clerestory::{Error, Result};
 
-use crate::easel::{OTHER_TOLERANCE, photon_tolerance};
+use crate::easel::{OTHER_TOLERANCE, PASSES, photon_tolerance, shares_noise};
 use crate::{Easel, Figure, HardCase, INDEXES, IndexCase, Judgement, LOBES};
 
 /// Photons of a pass, of techniques that have them, and samples of a pixel that ask them: one pass for nearly all pictures, whose noise is a
 /// hundredth in closed rooms.
 const PHOTONS: u32 = 1 << 14;
 const SAMPLES_PER_PASS: u32 = 1024;
+/// Walks of a pass, of techniques that have virtual lights: few, since pictures have several passes.
+const WALKS: u32 = 16;
 
 /// Texels along a side of light probes, of techniques that have them, and of their finest level that is filtered: none of the cases has a sky with
 /// details.
@@ -72,7 +75,8 @@ impl Subject {
     }
 
     /// What pictures of a technique lack by its own word, where that is a part of the light: such pictures are judged by whether they are whole,
-    /// finite and the same each time, and by values only as far as these are right all the same.
+    /// finite and the same each time, and by values as far as the path tracer's of the same light paths are right, or, of a technique with a bias, as far as
+    /// its own are.
     pub fn limits(&self) -> Option<String> {
         let Self::Technique { info, .. } = self else {
             return None;
@@ -91,7 +95,15 @@ impl Subject {
             return None;
         };
         if !self.has_bias() {
-            return Some("unbiased: pixels and means have what is expected, but for their noise".to_owned());
+            let shared = shares_noise(info, &Settings::default()).unwrap_or(false);
+            return Some(if shared {
+                format!(
+                    "unbiased: means over pictures have what is expected, but for their noise, by Student's t over {PASSES} passes at most; \
+                     single pixels promise nothing, since all share the noise of a pass"
+                )
+            } else {
+                "unbiased: pixels and means have what is expected, but for their noise".to_owned()
+            });
         }
         let percent = |tolerance: f64| format!("{:.1} %", 100.0 * tolerance);
         let allowed = if info.settings.has("photons") {
@@ -173,11 +185,32 @@ pub struct Outcome {
 
 /// A technique with the settings that all cases begin with.
 fn easel_of<'a>(gpu: &'a Gpu, info: &'static Card) -> Easel<'a> {
-    Easel::new(gpu, info, serde_json::Map::new())
+    let easel = Easel::new(gpu, info, serde_json::Map::new())
         .with("photons", PHOTONS)
-        .with("samples_per_pass", SAMPLES_PER_PASS)
+        .with("walks", WALKS)
         .with("probe_side", PROBE_SIDE)
-        .with("probe_finest", PROBE_FINEST)
+        .with("probe_finest", PROBE_FINEST);
+    if easel.has("photons") {
+        easel.with("samples_per_pass", SAMPLES_PER_PASS)
+    } else {
+        easel
+    }
+}
+
+/// What a technique's pictures lack, where that is why they are wrong: of an unbiased technique the path tracer's of the same light paths have to be wrong as well.
+fn lack(gpu: &Gpu, case: &HardCase, subject: &Subject, judgement: &Judgement) -> Result<Option<String>> {
+    let (Subject::Technique { info, .. }, Some(limits), Some(judge)) = (subject, subject.limits(), case.techniques)
+    else {
+        return Ok(None);
+    };
+    if !judgement.has_sound_pictures() {
+        return Ok(None);
+    }
+    let lacks = subject.has_bias() || {
+        let same = easel_of(gpu, techniques::by_id("path")?).with("path_set", info.path_set.to_string());
+        judgement.errs_where(&judge(&same)?)
+    };
+    Ok(lacks.then_some(limits))
 }
 
 /// Runs a case on a subject; `None` when it does not concern it.
@@ -199,10 +232,10 @@ pub fn judge(gpu: &Gpu, case: &HardCase, subject: &Subject) -> Option<Outcome> {
             Ok(judgement)
         }
     };
-    Some(outcome(case, subject, judged))
+    Some(outcome(gpu, case, subject, judged))
 }
 
-fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Outcome {
+fn outcome(gpu: &Gpu, case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Outcome {
     let mut outcome = Outcome {
         case: case.name,
         subject: subject.name(),
@@ -224,15 +257,21 @@ fn outcome(case: &HardCase, subject: &Subject, judged: Result<Judgement>) -> Out
             } else if let (true, Some(documented)) = (worst.is_documented(), case.documented_of(subject)) {
                 outcome.verdict = Verdict::Degrades;
                 outcome.reason = Some(documented.to_owned());
-            } else if let (true, Some(limits)) = (judgement.has_sound_pictures(), subject.limits()) {
-                outcome.verdict = Verdict::Degrades;
-                outcome.reason = Some(limits);
             } else {
-                outcome.reason = Some(format!(
-                    "{worst}: worse than is documented; avoid such scenes on this device and report the output of \
-                     `clerestory stability {} --json`",
-                    case.name
-                ));
+                match lack(gpu, case, subject, &judgement) {
+                    Ok(Some(limits)) => {
+                        outcome.verdict = Verdict::Degrades;
+                        outcome.reason = Some(limits);
+                    }
+                    Ok(None) => {
+                        outcome.reason = Some(format!(
+                            "{worst}: worse than is documented; avoid such scenes on this device and report the output of \
+                             `clerestory stability {} --json`",
+                            case.name
+                        ));
+                    }
+                    Err(error) => outcome.reason = Some(error.to_string()),
+                }
             }
         }
         Err(Error::Unsupported { reasons, .. }) => {

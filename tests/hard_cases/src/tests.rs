@@ -102,6 +102,7 @@ fn painted(value: f32) -> Painted {
         spp: 4,
         counters: std::collections::BTreeMap::new(),
         tolerance: 0.0,
+        passes: Vec::new(),
     }
 }
 
@@ -170,6 +171,71 @@ fn judgements_find_what_is_wrong() {
         Err::<(), _>(clerestory::Error::setting("a", 1, "b")),
         |_| false
     )));
+}
+
+#[test]
+fn means_of_shared_noise_are_judged_by_their_passes() {
+    // Passes that differ by 0.1 either way: 0.1 · 7.9 / √15 for 16 of them, whatever the pixels' variance says.
+    let shared = |value: f32, count: usize| Painted {
+        variance: vec![1e-12; 3],
+        passes: (0..count)
+            .map(|i| [f64::from(value) + 0.1 - 0.2 * (i % 2) as f64; 3])
+            .collect(),
+        ..painted(value)
+    };
+    for (value, right) in [(1.19, true), (1.22, false), (0.81, true), (0.78, false)] {
+        assert_eq!(
+            passes(|j| j.uniform("", &shared(value, 16), [1.0; 3]).expect("picture")),
+            right,
+            "{value}"
+        );
+        assert_eq!(
+            passes(|j| j.mean_at_most("", &shared(value, 16), 1.0)),
+            right || value < 1.0,
+            "{value}"
+        );
+        let exact = painted(1.0);
+        assert_eq!(
+            passes(|j| j
+                .same_expectations(
+                    "",
+                    &shared(value, 16),
+                    &Painted {
+                        variance: vec![0.0; 3],
+                        ..exact
+                    }
+                )
+                .expect("picture")),
+            right,
+            "{value}"
+        );
+    }
+    // Two such pictures differ by √2 times as much, and fewer passes know their variance less well.
+    assert!(passes(|j| j
+        .same_expectations("", &shared(1.27, 16), &shared(1.0, 16))
+        .expect("picture")));
+    assert!(!passes(|j| j
+        .same_expectations("", &shared(1.31, 16), &shared(1.0, 16))
+        .expect("picture")));
+    assert!(passes(|j| j.uniform("", &shared(1.5, 4), [1.0; 3]).expect("picture")));
+}
+
+#[test]
+fn only_pictures_that_others_get_wrong_as_well_are_excused() {
+    let judged = |wrong: &[&str]| {
+        let mut judgement = Judgement::default();
+        for picture in ["room", "court: by day"] {
+            judgement.at_most(
+                format!("{picture}: error of the mean"),
+                f64::from(u8::from(wrong.contains(&picture))),
+                0.5,
+            );
+        }
+        judgement
+    };
+    let (right, room, both) = (judged(&[]), judged(&["room"]), judged(&["room", "court: by day"]));
+    assert!(right.errs_where(&right) && room.errs_where(&room) && room.errs_where(&both));
+    assert!(!room.errs_where(&right) && !both.errs_where(&room) && !judged(&["court: by day"]).errs_where(&room));
 }
 
 #[test]

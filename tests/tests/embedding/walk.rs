@@ -3,12 +3,13 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use clerestory::gpu::ash::vk;
 use clerestory::gpu::shaders::types::GatheredLight;
-use clerestory::gpu::{ComputePipeline, DeviceKind, Gpu, Recorder};
+use clerestory::gpu::{Category, ComputePipeline, DeviceKind, Gpu, Recorder};
 use clerestory::scene::{Material, Medium, Scene};
 use clerestory::transport::{GpuScene, surface_spec};
 use clerestory::walk::{
-    Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveNeeds, WaveSet, stage_barrier,
+    Bounce, Turnover, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveNeeds, WaveSet, stage_barrier,
 };
 use clerestory::{Error, Result};
 use clerestory_tests::render::{cuboid, floor, upload};
@@ -262,5 +263,45 @@ fn memory_that_lacks_what_walks_need_is_refused() {
         ] {
             make(scene, shadows, needs).unwrap();
         }
+    });
+}
+
+#[test]
+fn walks_that_a_full_wave_cannot_take_are_refused() {
+    with_gpu(|gpu| {
+        let scene = upload(gpu, &scene());
+        let needs = WaveNeeds {
+            waiting: true,
+            media: false,
+            airlight: false,
+        };
+        let key = WalkKey {
+            first_sequence: 0,
+            first_index: 0,
+            indices: 64,
+            seed: 11,
+        };
+        let walker = |buffers| Walker::new(gpu, Arc::clone(&scene), buffers, WalkOptions::default()).unwrap();
+        let expect = |refused: clerestory::Result<()>, setting: &str, words: &str| match refused.err() {
+            Some(Error::Setting { name, cause, .. }) => {
+                assert!(name == setting && cause.contains(words), "{name}: {cause}")
+            }
+            other => panic!("{words}: {other:?}"),
+        };
+        let mut plain = walker(WaveBuffers::new(gpu, 64, needs).unwrap());
+        expect(plain.begin_full(key).map(drop), "wave", "a turnover");
+        let mut whole = plain.begin(key, 32).unwrap();
+        expect(plain.refill(&mut whole, 1), "walks", "begin_full");
+        let mut buffers = WaveBuffers::new(gpu, 64, needs).unwrap();
+        let format = vk::Format::R32G32B32A32_UINT;
+        buffers.number_by(gpu.storage_texels("numbers", Category::Work, format, 64).unwrap());
+        buffers.refill_by(Turnover::new(gpu, 64).unwrap());
+        let mut kept_full = walker(buffers);
+        let mut whole = kept_full.begin(key, 32).unwrap();
+        expect(kept_full.refill(&mut whole, 1), "walks", "between two bounces");
+        let mut full = kept_full.begin_full(key).unwrap();
+        expect(kept_full.refill(&mut full, 65), "walks", "64 free slots");
+        kept_full.refill(&mut full, 60).unwrap();
+        expect(kept_full.refill(&mut full, 5), "walks", "4 free slots");
     });
 }

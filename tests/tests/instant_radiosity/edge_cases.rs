@@ -2,8 +2,10 @@
 
 use super::*;
 use clerestory::Error;
+use clerestory::gpu::{GpuOptions, Lesser};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory_tests::render::{camera_down, floor};
+use clerestory_tests::{assert_no_messages, gpu_with};
 
 fn bits(picture: &[Vec<f32>; 2]) -> Vec<u32> {
     picture.iter().flatten().map(|value| value.to_bits()).collect()
@@ -71,6 +73,61 @@ fn parts_of_the_light_sum_to_the_whole() {
             "{direct} {few} {whole}"
         );
     });
+}
+
+/// A range of bounces beside a compensated bound: eye paths go on for virtual lights though their own light is too short for the range, and gather only where a
+/// connection is not too long for it.
+#[test]
+fn parts_of_the_light_are_whole_with_a_compensated_bound() {
+    with_gpu(|gpu| {
+        let scene = room();
+        for (least_bounces, most_bounces, set) in [(3, 0, "bounces=3.."), (0, 3, "bounces=0..3")] {
+            let settings = VirtualLightSettings {
+                samples_per_pass: 4,
+                bound: Bound::Geometry,
+                bound_value: 0.3,
+                least_bounces,
+                most_bounces,
+                ..settings()
+            };
+            let found = passes(gpu, &scene, &settings, 48);
+            found.expect_same_as(set, &traced_set(gpu, &scene, 2048, set), 0.0);
+        }
+        // Of two bounces the first surface has those of virtual lights, and no later one.
+        let settings = VirtualLightSettings {
+            most_bounces: 2,
+            ..settings()
+        };
+        let mut renderer = renderer(gpu, &scene, SIZE, &settings);
+        advance(&mut renderer, 2);
+        assert_eq!(renderer.counts().gather.gathers, u64::from(2 * SIDE * SIDE));
+    });
+}
+
+/// Where memory lacks, fewer paths are under way at once, so that there is room for what their places keep of the lights.
+#[test]
+fn waves_shrink_until_gathering_fits_beside_them() {
+    // Of the 5 MiB that the places of a whole wave keep.
+    const LACKING: u64 = 1 << 20;
+    let of = |heap_bytes| {
+        let lesser = Lesser {
+            heap_bytes,
+            ..Lesser::default()
+        };
+        let gpu = gpu_with(&GpuOptions {
+            lesser,
+            ..GpuOptions::default()
+        });
+        let mut renderer = renderer(&gpu, &room(), [16; 2], &settings());
+        let used = gpu.memory_report().total();
+        let picture = bits(&advance(&mut renderer, 2));
+        assert_no_messages(&gpu);
+        (used, picture)
+    };
+    let (whole, picture) = of(None);
+    let (used, of_fewer) = of(Some(whole - LACKING));
+    assert_eq!(of_fewer, picture);
+    assert!(used < whole / 4 * 3, "{used} of {whole}");
 }
 
 #[test]
@@ -142,14 +199,18 @@ fn points_that_coincide_bring_no_infinities() {
         scene.cameras.push(camera_down(1e-4, 1.0));
         add_point(&mut scene, Vec3::new(-2e-4, 2e-4, 0.0), Vec3::splat(1e-8));
         for bound in [Bound::None, Bound::Geometry, Bound::Distance] {
+            // Without direct light, of which there is some in any case.
             let settings = VirtualLightSettings {
                 walks: 256,
                 bound,
+                least_bounces: 2,
                 ..settings()
             };
+            let mut renderer = renderer(gpu, &scene, SIZE, &settings);
             // `advance` refuses samples and pixels that are not finite.
-            let [radiance, _] = advance(&mut renderer(gpu, &scene, SIZE, &settings), 2);
+            let [radiance, _] = advance(&mut renderer, 2);
             assert!(radiance.iter().any(|value| *value > 0.0), "{bound:?}");
+            assert!(renderer.counts().gather.shadow_rays > 0, "{bound:?}");
         }
     });
 }

@@ -7,6 +7,7 @@
 mod agreement;
 mod bounds;
 mod edge_cases;
+mod scattering;
 mod walks;
 
 use std::f64::consts::PI;
@@ -132,7 +133,12 @@ impl Passes {
 
 /// The path tracer's picture of the same light paths.
 fn traced(gpu: &Gpu, scene: &Scene, samples: u32) -> Rendered {
-    render(gpu, scene, SIZE, samples, &paths(PATHS))
+    traced_set(gpu, scene, samples, PATHS)
+}
+
+/// That of others.
+fn traced_set(gpu: &Gpu, scene: &Scene, samples: u32, set: &str) -> Rendered {
+    render(gpu, scene, SIZE, samples, &paths(set))
 }
 
 /// Adds a point light of a power in W.

@@ -44,20 +44,20 @@ fn how_the_work_is_cut_up_never_shows() {
         let truth = render(gpu, &scene, [24, 16], 8, &PathTracerSettings::default());
         assert!(truth.mean()[0].0 > 0.0);
         println!("{:?}", truth.counters);
-        for (paths_in_flight, ray_quota, submission_work, whole_waves) in [
-            (0, 32_768, 0, true),
-            (64, 32_768, 0, false),
-            (1000, 128, 0, false),
-            (0, 32_768, 4096, false),
-            (1000, 128, 4096, false),
+        for (paths_in_flight, ray_quota, submission_work, full_waves) in [
+            (0, 32_768, 0, false),
+            (64, 32_768, 0, true),
+            (1000, 128, 0, true),
+            (0, 32_768, 4096, true),
             (1000, 128, 4096, true),
+            (1000, 128, 4096, false),
         ] {
-            let what = format!("{paths_in_flight} {ray_quota} {submission_work} {whole_waves}");
+            let what = format!("{paths_in_flight} {ray_quota} {submission_work} {full_waves}");
             let settings = PathTracerSettings {
                 paths_in_flight,
                 ray_quota,
                 submission_work,
-                whole_waves,
+                full_waves,
                 ..PathTracerSettings::default()
             };
             let picture = render(gpu, &scene, [24, 16], 8, &settings);

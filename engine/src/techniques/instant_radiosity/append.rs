@@ -28,6 +28,14 @@ impl Append for LightAppend {
         "vpl_append"
     }
 
+    fn records(&self) -> &'static str {
+        "virtual lights"
+    }
+
+    fn fewer(&self) -> &'static str {
+        "follow fewer walks per pass: setting `walks`"
+    }
+
     fn pipeline(&self) -> PipelineInfo {
         self.0.info()
     }

@@ -3,17 +3,19 @@
 //! Places × lights are never stored: an invocation takes the lights of its place one after the other, as many a dispatch as the loops of the device allow, and
 //! goes on in the next one. So memory is that of the places, whatever the number of lights.
 
+use std::cell::Cell;
+
 use super::settings::VirtualLightSettings;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
-    INSTANCE_SEARCH_STEPS, LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD, PATH_SET_STATE_BITS, WALK_GROUP,
+    INSTANCE_SEARCH_STEPS, LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD, PATH_SET_STATE_BITS,
 };
 use crate::gpu::shaders::sets::{VirtualLightSet, WaveSet};
 use crate::gpu::shaders::techniques::instant_radiosity::vpl_gather;
 use crate::gpu::shaders::types::GatherState;
 use crate::gpu::{
-    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo, Recorder,
+    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Pace, Pass, PipelineInfo, Recorder,
     SOFTWARE_LOOP_CAP, TexelView, wide_counter,
 };
 use crate::transport::edge_bound::EdgeBound;
@@ -22,15 +24,15 @@ use crate::walk::{ArrivalStage, Places, RAY_QUOTA, StoppedPlaces, stage_barrier}
 use crate::{Error, Result};
 
 /// Lights that a place takes in one dispatch: enough to be worth looking the surface up again.
-const SOFTWARE_LIGHTS: u32 = 64;
-const DEVICE_LIGHTS: u32 = 64;
+const LIGHTS_A_DISPATCH: u32 = 64;
 /// Loop iterations below which a ray is stopped too often: fewer lights share a dispatch then.
 const QUOTA_WANTED: u32 = 256;
 /// Searches for an instance of a connection, beside those of its ray: three surfaces are looked up.
 const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
-/// Connections of a submission that goes on with places that have stopped: a second or less on two cores.
-const SOFTWARE_CONNECTIONS: u64 = 1 << 19;
-const DEVICE_CONNECTIONS: u64 = 1 << 26;
+/// Connections of a submission that goes on with places that have stopped, on software devices: a second or less on two cores.
+const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
+/// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections.
+const PLACES_AT_ONCE: u32 = 1 << 12;
 /// Sweeps over the places that have stopped beyond those which the lights take, for each light: rays longer than that never end.
 const SWEEPS_A_LIGHT: u64 = 4096;
 
@@ -46,6 +48,39 @@ pub struct VirtualLightCounts {
     pub shadow_rays: u64,
 }
 
+/// How many places a submission goes on with that have stopped: as many as a driver that watches has time for, by what the last one took.
+struct StoppedPace {
+    /// In units of [`PLACES_AT_ONCE`].
+    pace: Pace,
+    /// Units on software devices.
+    unwatched: u32,
+    /// Places of the submission that was recorded last, until its time is known.
+    recorded: Cell<u32>,
+}
+
+impl StoppedPace {
+    fn new(kind: DeviceKind, lights_at_once: u32) -> Self {
+        Self {
+            pace: Pace::new(kind, u32::MAX / PLACES_AT_ONCE),
+            unwatched: SOFTWARE_CONNECTIONS / (lights_at_once * PLACES_AT_ONCE),
+            recorded: Cell::new(0),
+        }
+    }
+
+    /// Of the next submission, in whole workgroups.
+    fn places(&self) -> u32 {
+        self.pace.units(PLACES_AT_ONCE, self.unwatched) * PLACES_AT_ONCE
+    }
+
+    /// A submission took so long, whether it went on with such places or not.
+    fn submitted(&mut self, seconds: f64) {
+        let places = self.recorded.take();
+        if places > 0 {
+            self.pace.submitted(seconds, u64::from(places));
+        }
+    }
+}
+
 /// The kernel of connections, and what places keep between its dispatches.
 pub(super) struct Gather {
     pipeline: ComputePipeline<vpl_gather::Kernel>,
@@ -56,9 +91,7 @@ pub(super) struct Gather {
     path_states: u32,
     bounces: [u32; 2],
     edge_bound: EdgeBound,
-    lights_at_once: u32,
-    /// Connections of a submission.
-    connections: u64,
+    pace: StoppedPace,
 }
 
 /// Connections to the virtual lights of a pass, to be recorded with a wave.
@@ -71,21 +104,24 @@ pub(super) struct GatherStage<'a> {
     pub scale: f32,
     /// [`PathTracer::departures`](crate::techniques::PathTracer::departures).
     pub departures: Buffer,
-    /// Of the random numbers that alpha is drawn by.
+    /// Of the random numbers that alpha is drawn by, of the pass: another one for each.
     pub seed: u32,
 }
 
 type Counters = vpl_gather::VirtualLightCounters;
 
 impl Gather {
-    /// For eye paths of the set `eye`, up to `slots` at once.
+    /// What a place keeps between dispatches.
+    pub const STATE_BYTES: u64 = size_of::<GatherState>() as u64;
+
+    /// For eye paths of the set `eye`; `states` has [`STATE_BYTES`](Self::STATE_BYTES) for each that may be under way.
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
         settings: &VirtualLightSettings,
         eye: &PathSet,
         edge_bound: EdgeBound,
-        slots: u32,
+        states: Buffer,
     ) -> Result<Self> {
         let profile = scene.profile();
         let (lights_at_once, index_quota) = lights_at_once(gpu, scene, settings.lights_at_once)?;
@@ -103,20 +139,15 @@ impl Gather {
             ..Default::default()
         });
         let bytes = size_of::<Counters>() as u64;
-        let states = size_of::<GatherState>() as u64 * u64::from(slots);
         Ok(Self {
             pipeline: traversal.pipeline(gpu, &spec)?,
-            states: gpu.buffer(&BufferDesc::storage("virtual light states", states, Category::Work))?,
+            states,
             counters: gpu.buffer(&BufferDesc::storage("virtual light counters", bytes, Category::Work))?,
             counters_readback: gpu.buffer(&BufferDesc::readback("virtual light counters", bytes))?,
             path_states: gathering_states(eye),
             bounces: [settings.least_bounces, settings.most().unwrap_or(u32::MAX)],
             edge_bound,
-            lights_at_once,
-            connections: match gpu.caps().kind {
-                DeviceKind::Cpu => SOFTWARE_CONNECTIONS,
-                _ => DEVICE_CONNECTIONS,
-            },
+            pace: StoppedPace::new(gpu.caps().kind, lights_at_once),
         })
     }
 
@@ -134,6 +165,11 @@ impl Gather {
         })
     }
 
+    /// A submission in which the stage may have been recorded took so long.
+    pub fn submitted(&mut self, seconds: f64) {
+        self.pace.submitted(seconds);
+    }
+
     fn read(&self) -> Result<Counters> {
         Ok(self.counters_readback.read::<Counters>(0, 1)?[0])
     }
@@ -142,11 +178,11 @@ impl Gather {
 /// Lights that a place takes in a dispatch, and loop iterations after which a shadow ray goes on in the next: together they stay below what software drivers run.
 fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<(u32, u32)> {
     let filters = scene.profile().has_alpha();
-    let most = match gpu.caps().kind {
-        DeviceKind::Cpu => SOFTWARE_LIGHTS,
-        _ => DEVICE_LIGHTS,
+    let mut lights = if wanted == 0 {
+        LIGHTS_A_DISPATCH
+    } else {
+        wanted.min(LIGHTS_A_DISPATCH)
     };
-    let mut lights = if wanted == 0 { most } else { wanted.min(most) };
     loop {
         // The loop over lights itself, and what a connection takes beside its ray.
         let beside = 1 + if scene.profile().keeps_instances { SEARCHES } else { 0 };
@@ -197,12 +233,6 @@ impl GatherStage<'_> {
             light_departures: self.departures.view(),
         }
     }
-
-    /// Places of a submission that goes on, in whole workgroups.
-    fn places(&self) -> u32 {
-        let places = self.gather.connections / u64::from(self.gather.lights_at_once);
-        (places.min(u64::from(u32::MAX / 2)) as u32).next_multiple_of(WALK_GROUP)
-    }
 }
 
 impl ArrivalStage for GatherStage<'_> {
@@ -225,7 +255,7 @@ impl ArrivalStage for GatherStage<'_> {
         pass.copy(self.gather.counters.view(), self.gather.counters_readback.view())
     }
 
-    /// Sweep after sweep over the places, until none has lights left; after each the device's count of these is read.
+    /// Sweep after sweep over the places, until none has lights left; after each the device's count of these is read. Parts count places of all sweeps.
     fn record_stopped(
         &self,
         recorder: &mut Recorder,
@@ -234,10 +264,9 @@ impl ArrivalStage for GatherStage<'_> {
         part: u64,
     ) -> Result<Option<u64>> {
         let gather = self.gather;
-        let places = self.places();
-        let ranges = u64::from(stopped.places.div_ceil(places)).max(1);
-        let (sweep, range) = (part / ranges, part % ranges);
-        if range == 0 && sweep > 0 {
+        let all = stopped.places.max(1);
+        let (sweep, first) = (part / u64::from(all), (part % u64::from(all)) as u32);
+        if first == 0 && sweep > 0 {
             if gather.read()?.remaining == 0 {
                 return Ok(None);
             }
@@ -252,28 +281,30 @@ impl ArrivalStage for GatherStage<'_> {
                 });
             }
         }
+        let places = gather.pace.places().min(all - first);
+        gather.pace.recorded.set(places);
         let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
         let push = vpl_gather::Push {
-            first_place: range as u32 * places,
+            first_place: first,
             goes_on: 1,
             ..self.push()
         };
         recorder.pass("vpl: gather on", |pass| {
-            if range == 0 {
+            if first == 0 {
                 let offset = std::mem::offset_of!(Counters, remaining) as u64;
                 pass.fill(gather.counters.slice(offset, size_of::<u32>() as u64), 0)?;
                 pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             }
-            let groups = [gather.pipeline.groups_for(places.min(stopped.places)), 1, 1];
+            let groups = [gather.pipeline.groups_for(places), 1, 1];
             pass.dispatch(&gather.pipeline, &[wave, &index, &scene, &own], &push, groups)?;
-            if range + 1 == ranges {
+            if first + places == all {
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
                 self.read_back(pass)?;
             }
             stage_barrier(pass);
             Ok(())
         })?;
-        Ok(Some(part + 1))
+        Ok(Some(part + u64::from(places)))
     }
 }
 
@@ -335,6 +366,27 @@ pub(crate) const ROWS: &[Row] = &[
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn places_that_go_on_are_as_many_as_a_driver_has_time_for() {
+        let mut pace = StoppedPace::new(DeviceKind::Discrete, 64);
+        assert_eq!(pace.places(), PLACES_AT_ONCE);
+        // A submission of other stages says nothing of the pace of this one.
+        pace.submitted(1.0);
+        assert_eq!(pace.places(), PLACES_AT_ONCE);
+        let mut after = |places, seconds| {
+            pace.recorded.set(places);
+            pace.submitted(seconds);
+            pace.places()
+        };
+        // A quarter of a second each.
+        assert_eq!(after(PLACES_AT_ONCE, 1e-3), 250 * PLACES_AT_ONCE);
+        assert_eq!(after(250 * PLACES_AT_ONCE, 1.0), 62 * PLACES_AT_ONCE);
+        // Seconds for the least there is: no less is to be had.
+        assert_eq!(after(PLACES_AT_ONCE, 3.0), PLACES_AT_ONCE);
+        let software = |lights| StoppedPace::new(DeviceKind::Cpu, lights).places();
+        assert_eq!([64, 1].map(software), [1 << 13, 1 << 19]);
+    }
 
     #[test]
     fn rough_vertices_gather_where_a_path_may_be_scattered_once_more() {

@@ -5,13 +5,15 @@
 //!
 //! Light paths are parted without overlap. The eye paths are the path tracer's: light seen through mirrors alone, and the light that arrives directly where the eye first
 //! sees a surface that is none. What arrives there after one scattering or more comes from the virtual lights, as far as the bound of the geometry term leaves it;
-//! beyond, eye paths go on with the weight of what it left out, and gather again where they arrive. Light off a mirror onto the first rough surface is no
-//! part of the picture: no virtual light lies on a mirror.
+//! beyond, eye paths go on with the weight of what it left out, and gather again where they arrive. Light off a mirror or through smooth glass onto the first
+//! rough surface is no part of the picture: no virtual light lies on either.
 //!
 //! Guarantees: deterministic in (seed, pass, walk) and (seed, pixel, sample), on any number of threads; unbiased on its path set without a bound and with a compensated
-//! one, since passes have virtual lights of their own, each an unbiased estimate for all pixels at once. Pixels share the noise of a pass.
+//! one, since passes have virtual lights of their own, each an unbiased estimate for all pixels at once; but for walks that go on over surfaces whose shading normals
+//! lean, as those bend towards the light on a walk and towards the eye on the path tracer's paths. Pixels share the noise of a pass.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::append::LightAppend;
 use super::card::refusals;
@@ -26,13 +28,19 @@ use crate::settings::TypedSettings;
 use crate::techniques::path::PathCounters;
 use crate::techniques::photon_mapping::{PhotonCounts, PhotonPlan, PhotonTracer, Stored, Tracing};
 use crate::techniques::{PathTracer, PathTracerSettings};
+use crate::transport::random::pcg4d;
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::ArrivalStage;
 use crate::{Error, Result};
-use glam::Vec3;
+use glam::{UVec4, Vec3};
 
 /// Scatterings that a connection adds to those of a walk: at the virtual light, and where it shines on.
 const CONNECTED: u32 = 2;
+
+/// What alpha is drawn by on the ways to a pass's virtual lights: independent from pass to pass.
+fn seed_of_pass(seed: u32, pass: u32) -> u32 {
+    pcg4d(UVec4::new(seed, pass, 0, 0)).x
+}
 
 /// Exact counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -135,15 +143,16 @@ impl VirtualLights {
             aovs: settings.aovs,
             submission_work: settings.submission_work,
             // What arrives is gathered wave by wave, for each pass of walks.
-            whole_waves: true,
+            full_waves: false,
             ..PathTracerSettings::default()
         };
-        // Takes as much memory as is left, if it must.
-        let eye = PathTracer::beyond(gpu, Arc::clone(&scene), camera, size, eye_settings, bound)?;
+        // Takes as much memory as is left, if it must, with what gathering keeps.
+        let kept = if has_lights { Gather::STATE_BYTES } else { 0 };
+        let eye = PathTracer::beyond(gpu, Arc::clone(&scene), camera, size, eye_settings, bound, kept)?;
         let lights = match tracer {
             Some(tracer) => Some(Lights {
                 tracer,
-                gather: Gather::new(gpu, &scene, &settings, &eye_paths, bound, eye.slots())?,
+                gather: Gather::new(gpu, &scene, &settings, &eye_paths, bound, eye.stage_memory())?,
                 tracing: None,
                 count: None,
             }),
@@ -274,14 +283,19 @@ impl VirtualLights {
                 count: *count,
                 scale: 1.0 / self.settings.walks as f32,
                 departures: self.eye.departures(),
-                seed: self.settings.seed,
+                seed: seed_of_pass(self.settings.seed, pass),
             }),
             _ => None,
         };
         let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
         let gathers = arrival.is_some();
+        let clock = Instant::now();
         let step = self.eye.step_with(end, arrival)?;
+        let waited = clock.elapsed().as_secs_f64();
         if let Some(lights) = &mut self.lights {
+            let timings = step.iter().flat_map(|step| &step.timings);
+            let seconds = timings.map(|timings| timings.untimed.map_or(timings.seconds(), |_| waited));
+            lights.gather.submitted(seconds.sum());
             // They are those of a whole wave.
             if gathers && step.is_some() && !self.eye.is_within_wave() {
                 let counts = lights.gather.counts()?;

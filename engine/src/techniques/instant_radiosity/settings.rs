@@ -3,15 +3,14 @@
 use crate::techniques::path::SAMPLES_PER_WAVE;
 use crate::transport::PathSet;
 use crate::transport::edge_bound::EdgeBound;
+use crate::transport::path_set::{PATH_SET_LOBES, PATH_SET_UNBOUNDED};
 use crate::transport::random::SamplerKind;
 use crate::{Error, Result};
 
-/// Light paths whose first rough vertex from the eye is not lit off a mirror: no virtual light lies on one.
-pub(super) const PATHS: &str = "!L.*S[DG]S*E";
 /// What eye paths have where virtual lights bring all that is reflected more than once.
 const DIRECT: &str = "L[DG]?S*E";
-/// Virtual lights count their scatterings in a word, beside the two that a connection adds.
-const BOUNCES_MAX: u32 = 4000;
+/// A path set's range has twelve bits for each of its ends.
+const BOUNCES_MAX: u32 = PATH_SET_UNBOUNDED - 1;
 
 /// How the geometry term between a virtual light and a point that it lights is bounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -40,7 +39,9 @@ pub enum Compensation {
 crate::settings! {
     /// Settings of virtual point lights.
     pub struct VirtualLightSettings {
-        /// Walks from the lights for each pass, which leave a virtual light wherever they are scattered; more have less noise, and cost as many shadow rays more.
+        /// Walks from the lights for each pass, which leave a virtual light wherever they are scattered; more walks give less noise and proportionally more shadow rays.
+        ///
+        /// A pass whose virtual lights, 64 bytes each, do not fit into a buffer of the device ends with an error.
         pub walks: u32 = 64, in 1..=1 << 20, unit "walks per pass";
         /// Bound of the geometry term between a virtual light and what it lights: none, of the term as a whole, or of the squared distance.
         ///
@@ -62,6 +63,8 @@ crate::settings! {
         /// Source: A. Keller, "Instant Radiosity", SIGGRAPH 1997, whose walks are fractional powers of the albedo times their number.
         pub fractional: bool = false;
         /// Eye paths per pixel that the same virtual lights light.
+        ///
+        /// Above 1 the layer `variance` lacks the noise of the virtual lights, which the samples of a pass share.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
         pub sampler: SamplerKind = SamplerKind::Sobol;
@@ -133,16 +136,11 @@ impl VirtualLightSettings {
     /// # Errors
     /// [`Error::Setting`] for a range that needs too large an automaton.
     pub(super) fn path_set(&self) -> Result<PathSet> {
-        let all: PathSet = PATHS.parse()?;
-        let range = PathSet::new(
-            self.least_bounces,
-            self.most(),
-            crate::transport::path_set::PATH_SET_LOBES,
-        )?;
+        let range = PathSet::new(self.least_bounces, self.most(), PATH_SET_LOBES)?;
         if range == PathSet::ALL {
-            return Ok(all);
+            return Ok(PathSet::LIT_OFF_NO_MIRROR);
         }
-        all.intersection(&range)
+        PathSet::LIT_OFF_NO_MIRROR.intersection(&range)
     }
 
     /// What eye paths have by themselves, and beyond the bound.
@@ -152,7 +150,7 @@ impl VirtualLightSettings {
     pub(super) fn eye_paths(&self) -> Result<PathSet> {
         let paths: PathSet = match (self.compensates(), self.compensation_steps) {
             (false, _) => DIRECT.parse()?,
-            (true, 0) => PATHS.parse()?,
+            (true, 0) => PathSet::LIT_OFF_NO_MIRROR,
             (true, steps) => format!("L[DG]{{0,{}}}S*E", steps + 1).parse()?,
         };
         // The range stays beside the automaton: folded into it, it would end eye paths whose own light is too short for it, but which virtual lights light.

@@ -12,20 +12,37 @@ pub(super) struct KeptBySlot {
     receivers: Option<Buffer>,
     /// Under which cosine they left there, where edges are bounded by their geometry term.
     departures: Option<Buffer>,
+    /// What an arrival stage keeps by place.
+    stage: Option<Buffer>,
+}
+
+/// What there is to keep.
+#[derive(Clone, Copy)]
+pub(super) struct KeptNeeds {
+    pub aovs: bool,
+    pub receivers: bool,
+    pub departures: bool,
+    /// Of an arrival stage, by place.
+    pub stage_bytes: u64,
 }
 
 impl KeptBySlot {
-    pub fn new(gpu: &Gpu, slots: u32, has_aovs: bool, has_receivers: bool, has_departures: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, slots: u32, has: KeptNeeds) -> Result<Self> {
         let work = |name, bytes: usize, slots: u32| {
             let bytes = bytes as u64 * u64::from(slots);
             gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work))
         };
         let receivers = || work("path receivers", size_of::<LightReceiver>(), slots);
         let departures = || work("path departures", size_of::<f32>(), slots);
+        let stage = || {
+            let bytes = has.stage_bytes * u64::from(slots);
+            gpu.buffer(&BufferDesc::storage("arrival stage", bytes, Category::Work))
+        };
         Ok(Self {
-            aovs: work("path aovs", size_of::<PathAov>(), if has_aovs { slots } else { 0 })?,
-            receivers: has_receivers.then(receivers).transpose()?,
-            departures: has_departures.then(departures).transpose()?,
+            aovs: work("path aovs", size_of::<PathAov>(), if has.aovs { slots } else { 0 })?,
+            receivers: has.receivers.then(receivers).transpose()?,
+            departures: has.departures.then(departures).transpose()?,
+            stage: (has.stage_bytes > 0).then(stage).transpose()?,
         })
     }
 
@@ -36,6 +53,11 @@ impl KeptBySlot {
             path_receivers: self.receivers.as_ref().unwrap_or(&self.aovs).view(),
             path_departures: self.departures().view(),
         }
+    }
+
+    /// What an arrival stage keeps, or some other buffer.
+    pub fn stage(&self) -> &Buffer {
+        self.stage.as_ref().unwrap_or(&self.aovs)
     }
 
     /// Cosines at departure, or some other buffer.

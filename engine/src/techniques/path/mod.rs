@@ -28,7 +28,7 @@ use std::sync::Arc;
 
 use self::adaptive::AdaptiveSamples;
 pub(super) use self::card::CARD;
-use self::kept::KeptBySlot;
+use self::kept::{KeptBySlot, KeptNeeds};
 use self::pipelines::{CameraStage, Pipelines};
 use self::record::{EyeStages, ResolveTarget, UnderWay, record_resolve};
 use self::refill::{FullWave, ResultMemory, slot_numbers};
@@ -154,11 +154,12 @@ impl PathTracer {
         size: [u32; 2],
         settings: PathTracerSettings,
     ) -> Result<Self> {
-        Self::beyond(gpu, scene, camera, size, settings, EdgeBound::Unbounded)
+        Self::beyond(gpu, scene, camera, size, settings, EdgeBound::Unbounded, 0)
     }
 
     /// As [`PathTracer::new`], for pictures in which an [`ArrivalStage`] brings the light of edges between two scatterings that are no mirrors', up to a bound: paths
-    /// have what it leaves out, and with [`EdgeBound::Unbounded`] all that their path set has.
+    /// have what it leaves out, and with [`EdgeBound::Unbounded`] all that their path set has. The stage has `stage_bytes` of memory by place
+    /// ([`PathTracer::stage_memory`]), for as many places as there is memory for both.
     pub(crate) fn beyond(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -166,6 +167,7 @@ impl PathTracer {
         size: [u32; 2],
         settings: PathTracerSettings,
         edge_bound: EdgeBound,
+        stage_bytes: u64,
     ) -> Result<Self> {
         settings.check()?;
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
@@ -200,7 +202,13 @@ impl PathTracer {
         let adaptive = settings.adaptive != Adaptive::Off;
         let more = |slots| {
             let has_departures = matches!(edge_bound, EdgeBound::Geometry(_));
-            let kept = KeptBySlot::new(gpu, slots, film.has_aovs(), light_tree.is_some(), has_departures)?;
+            let has = KeptNeeds {
+                aovs: film.has_aovs(),
+                receivers: light_tree.is_some(),
+                departures: has_departures,
+                stage_bytes,
+            };
+            let kept = KeptBySlot::new(gpu, slots, has)?;
             let adaptive_numbers = || {
                 let format = vk::Format::R32G32_UINT;
                 gpu.storage_texels("path numbers", Category::Work, format, slots.into())
@@ -358,15 +366,15 @@ impl PathTracer {
         Ok(adaptive.next_wave(&self.cursor, &self.film, slots))
     }
 
-    /// Where passes have `each` samples per pixel, whatever the target of each call: which one is under way towards `samples`, and with how many samples it ends,
-    /// or this call with it; `None` when all are there.
+    /// Where waves are whole and passes have `each` samples per pixel, whatever the target of each call: which one is under way towards `samples`, and with how many
+    /// samples it ends, or this call with it; `None` when all are there.
     pub(crate) fn pass_towards(&self, samples: u32, each: u32) -> Option<[u32; 2]> {
         let done = self.samples_done();
         let pass = done / each;
         (done < samples).then(|| [pass, (pass + 1).saturating_mul(each).min(samples)])
     }
 
-    /// Whether such a pass has ended since there were `before` samples per pixel.
+    /// Whether such a pass has ended since every pixel had received `before` samples.
     pub(crate) fn has_ended_pass(&self, before: u32, each: u32) -> bool {
         self.samples_done().is_multiple_of(each) && self.samples_done() > before
     }
@@ -407,13 +415,20 @@ impl PathTracer {
         self.kept.departures().clone()
     }
 
-    /// Whether a wave is under way between two steps.
+    /// What an arrival stage keeps by place, of as many bytes as were asked for.
+    pub(crate) fn stage_memory(&self) -> Buffer {
+        self.kept.stage().clone()
+    }
+
+    /// Whether a wave is under way between two steps, where waves are whole.
     pub(crate) fn is_within_wave(&self) -> bool {
+        debug_assert!(self.full.is_none(), "a wave that is kept full is always under way");
         self.in_flight.is_some()
     }
 
-    /// Samples that every pixel has received, where all get as many.
+    /// Samples that every pixel has received, where all get as many and waves are whole: of waves that are kept full the cursor tells what has begun.
     pub(crate) fn samples_done(&self) -> u32 {
+        debug_assert!(self.full.is_none(), "samples that have begun are not those received");
         self.cursor.sample
     }
 

@@ -95,10 +95,10 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
-        /// Ends each wave of paths before the next one begins; adaptive samples do in any case. Without, new paths take the slots of those that have ended, so that
-        /// passes are fewer, and samples reach the film pixel by pixel: a picture that is looked at before it is done lacks its last pixels. Never changes the
-        /// picture that is done.
-        pub whole_waves: bool = true;
+        /// Lets new paths take the slots of those that have ended, so that passes are fewer, and samples reach the film pixel by pixel: a picture that is looked at
+        /// before it is done lacks its last pixels. Without, as with adaptive samples in any case, each wave of paths ends before the next one begins. Never
+        /// changes the picture that is done.
+        pub full_waves: bool = false;
         /// Counts what is fetched ([`PathCounters::fetches`](crate::techniques::path::PathCounters::fetches)), by other kernels. Never changes the picture: for measuring.
         pub count_fetches: bool = false;
         /// Work, in loop iterations, after which a submission begins no further place, as [`WalkOptions::work`](crate::walk::WalkOptions::work);
@@ -110,7 +110,7 @@ crate::settings! {
 impl PathTracerSettings {
     /// Whether new paths take the slots of those that have ended. A round of adaptive samples follows from all samples before it.
     pub(super) fn keeps_waves_full(&self) -> bool {
-        self.adaptive == Adaptive::Off && !self.whole_waves
+        self.adaptive == Adaptive::Off && self.full_waves
     }
 
     /// Whether slots have pixels and samples of their own.

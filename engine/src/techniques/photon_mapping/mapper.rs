@@ -126,7 +126,7 @@ impl PhotonMapper {
             aovs: settings.aovs,
             submission_work: settings.submission_work,
             // What arrives is gathered and counted wave by wave, for each pass of photons.
-            whole_waves: true,
+            full_waves: false,
             ..PathTracerSettings::default()
         };
         let has_map = settings.needs_photons() && scene.has_lights();

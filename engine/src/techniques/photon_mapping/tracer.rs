@@ -102,6 +102,12 @@ pub(in crate::techniques) trait Append: Send {
     /// Of its kernel, in errors.
     fn name(&self) -> &'static str;
 
+    /// What its records are, in errors.
+    fn records(&self) -> &'static str;
+
+    /// What to do where there are more of them than the device can hold, in errors.
+    fn fewer(&self) -> &'static str;
+
     fn pipeline(&self) -> PipelineInfo;
 
     /// Records what makes those that wait into records behind `first` and the wave's earlier ones, as far as there is room for `capacity`.
@@ -135,6 +141,14 @@ impl Append for PhotonAppend {
 
     fn name(&self) -> &'static str {
         "photon_append"
+    }
+
+    fn records(&self) -> &'static str {
+        "photon records"
+    }
+
+    fn fewer(&self) -> &'static str {
+        "trace fewer photons per pass: setting `photons`"
     }
 
     fn pipeline(&self) -> PipelineInfo {
@@ -394,10 +408,10 @@ impl PhotonTracer {
         if needed > most {
             return Err(Error::Overflow {
                 kernel: self.kit.append.name().into(),
-                what: "photon records".into(),
+                what: self.kit.append.records().into(),
                 needed,
                 capacity: most,
-                instead: "trace fewer photons per pass".into(),
+                instead: self.kit.append.fewer().into(),
             });
         }
         let capacity = (needed + needed / 4).min(most) as u32;

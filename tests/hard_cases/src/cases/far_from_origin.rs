@@ -12,7 +12,7 @@ use crate::{Easel, HardCase, Judgement};
 const DOCUMENTED_BIAS: f64 = 0.02;
 /// The same where photons start and land as far off walls, too.
 const DOCUMENTED_BIAS_OF_MAPS: f64 = 0.04;
-/// Samples of a pass, of techniques that have photons: four passes, whose noise is half of that of one, below what is documented.
+/// Samples of a pass, of techniques with a bias: four passes, whose noise is half of that of one, below what is documented.
 const SAMPLES_PER_PASS: u32 = 16;
 
 pub(super) const CASE: HardCase = HardCase {

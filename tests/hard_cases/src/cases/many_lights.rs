@@ -57,6 +57,6 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         .flat_map(|e| [(f64::from(RHO) * e / std::f64::consts::PI) as f32; 3])
         .collect();
     let painted = easel.paint(&scene, [SIZE; 2], 256)?;
-    judgement.pixels("sum of the laws", &painted, &radiance, None)?;
+    judgement.pixels("sum of the laws", &painted, &radiance)?;
     Ok(judgement)
 }

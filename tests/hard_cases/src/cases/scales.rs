@@ -55,7 +55,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         transform(&mut scene, DAffine3::from_scale(DVec3::splat(scale)));
         let painted = easel.other_seed().paint(&scene, SMALL, 256)?;
         let what = format!("Cornell box of {scale} of its size");
-        judgement.pixels(&what, &painted, &truth.radiance, Some(&truth.variance))?;
+        judgement.same_expectations(&what, &painted, &truth)?;
     }
     Ok(judgement)
 }

@@ -24,7 +24,7 @@ const TURNS: usize = 5;
 /// Side and samples per pixel, in full and of a smoke run.
 const PICTURE: ((u32, u32), (u32, u32)) = ((192, 32), (8, 4));
 /// Forms of waves: slots of paths that have ended take new samples, or wait for the longest path.
-const WAVES: [(&str, bool); 2] = [("kept full", false), ("whole", true)];
+const WAVES: [(&str, bool); 2] = [("kept full", true), ("whole", false)];
 /// Host time beside the device's that counts as little, and the share of slots that a bounce is to fill.
 const MOST_HOST_SHARE: f64 = 1.1;
 const LEAST_FILLED: f64 = 0.5;
@@ -149,7 +149,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Found> {
     };
     let all = context.in_turns(TURNS, WAVES.len(), |form| {
         render(PathTracerSettings {
-            whole_waves: WAVES[form].1,
+            full_waves: WAVES[form].1,
             ..PathTracerSettings::default()
         })
     })?;
