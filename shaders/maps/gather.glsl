@@ -1,16 +1,15 @@
-// Solid angles of lights seen from elsewhere, and reflectivities of cones. Sources, bias and guarantees: maps/gather/mod.rs. Expects
+// Lights of a coarse map, and their solid angles seen from elsewhere. Sources, bias and guarantees: maps/gather/mod.rs. Expects
 // `float gather_table_value(uint)`.
 #ifndef CLERESTORY_MAPS_GATHER_GLSL
 #define CLERESTORY_MAPS_GATHER_GLSL
 
+#include "maps/gather_disc.glsl"
 #include "pi.glsl"
 
 // Forms of solid angles.
 const uint GATHER_RATIO = 0u;
 const uint GATHER_DISC = 1u;
 const uint GATHER_NORMALS = 2u;
-// Sizes, and cosines, of the table of reflectivities.
-const uint GATHER_TABLE_SIDE = 64u;
 // Lights that are summed by themselves, so that small terms meet small sums.
 const uint GATHER_BLOCK = 64u;
 // Terms that few are.
@@ -31,31 +30,16 @@ struct GatherRecord {
     uint normal;
 };
 
-// 2 pi (1 - 1 / sqrt(1 + t)), without the difference that cancels for small t.
-float gather_disc(float t) {
-    float root = sqrt(1.0 + t);
-    return 2.0 * PI * t / (root * (root + 1.0));
-}
-
 // Of a light at a point; `cosine` is that of the surface's normal with the direction to the point.
 float gather_solid_angle(float area, float squared, float cosine) {
     float ratio = area / squared;
     if (GATHER_FORM == GATHER_RATIO) {
         return ratio;
     }
-    return gather_disc(GATHER_FORM == GATHER_NORMALS ? ratio * max(cosine, 0.0) : ratio);
-}
-
-// Mean of a lobe over a cone, by the cosines of the cone's half angle and of its axis with the lobe's.
-float gather_reflectivity(float cone, float axis) {
-    float last = float(GATHER_TABLE_SIDE - 1u);
-    vec2 place = last * clamp(vec2(cone, 0.5 * axis + 0.5), 0.0, 1.0);
-    vec2 corner = min(floor(place), vec2(last - 1.0));
-    vec2 part = place - corner;
-    uint first = uint(corner.y) * GATHER_TABLE_SIDE + uint(corner.x);
-    float upper = mix(gather_table_value(first), gather_table_value(first + 1u), part.x);
-    float lower = mix(gather_table_value(first + GATHER_TABLE_SIDE), gather_table_value(first + GATHER_TABLE_SIDE + 1u), part.x);
-    return mix(upper, lower, part.y);
+    if (GATHER_FORM == GATHER_NORMALS) {
+        return cosine > 0.0 ? gather_disc(ratio * cosine) : 0.0;
+    }
+    return gather_disc(ratio);
 }
 
 #endif

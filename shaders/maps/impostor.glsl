@@ -10,6 +10,8 @@
 const float IMPOSTOR_NOTHING = 1e16;
 // Layers of surfaces at most.
 const uint IMPOSTOR_LAYERS_MAX = 8u;
+// By how much the squared length of a direction may be off 1.
+const float IMPOSTOR_UNIT = 1e-3;
 // By how much, relatively, a march begins before the least distance and ends behind the greatest: surfaces between texels' centres.
 const float IMPOSTOR_MARGIN = 0.05;
 
@@ -102,13 +104,18 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     return d;
 }
 
-// By even steps to the first crossing of a surface, and bisection; `extent` is the least and the greatest distance of a surface.
+// By even steps to the first crossing whose residual is below the tolerance, and bisection; `extent` is the least and the greatest distance of a surface.
 float impostor_by_march(uint layer, vec3 x, vec3 r, vec2 extent, float tolerance) {
     float begin = length(x) < extent.x ? (1.0 - IMPOSTOR_MARGIN) * sphere_proxy(x, r, extent.x) : 0.0;
+    float g_low = impostor_ratio(layer, x, r, begin);
+    if (begin > 0.0 && g_low >= 1.0) {
+        // Between the centres of coarse texels the surface is nearer than at any of them.
+        begin = 0.0;
+        g_low = impostor_ratio(layer, x, r, begin);
+    }
     float end = (1.0 + IMPOSTOR_MARGIN) * sphere_proxy(x, r, extent.y);
     float interval = max(end - begin, 0.0) / float(IMPOSTOR_STEPS);
     float low = begin;
-    float g_low = impostor_ratio(layer, x, r, begin);
     float best = end;
     float least = IMPOSTOR_NOTHING;
     bool is_found = false;
@@ -140,10 +147,10 @@ float impostor_by_march(uint layer, vec3 x, vec3 r, vec2 extent, float tolerance
     return !is_found && g_low < 1.0 ? end : best;
 }
 
-// Of the unit direction r.
+// Of the unit direction r; others find nothing, nor does an x as far as where there is nothing.
 ImpostorHit impostor_search(vec3 x, vec3 r, vec2 extent, float tolerance) {
     ImpostorHit best = ImpostorHit(vec3(0.0), 0.0, 1.0, 0u);
-    bool is_ray = dot(r, r) > 0.0 && !any(isinf(r)) && !any(isnan(x)) && !any(isinf(x));
+    bool is_ray = abs(dot(r, r) - 1.0) < IMPOSTOR_UNIT && all(lessThan(abs(x), vec3(IMPOSTOR_NOTHING)));
     if (!is_ray) {
         return best;
     }

@@ -1,5 +1,5 @@
 #version 460
-// Impostors' functions, for comparison with their Rust twins: `function` says which.
+// Functions of impostors and of gathers, for comparison with their Rust twins: `function` says which.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -7,6 +7,9 @@
 
 vec3 map_place(uint i) { return vec3(twin_table[3u * i], twin_table[3u * i + 1u], twin_table[3u * i + 2u]); }
 
+float gather_table_value(uint i) { return twin_table[i]; }
+
+#include "maps/gather_disc.glsl"
 #include "maps/impostor_step.glsl"
 #include "maps/map_places.glsl"
 #include "maps/proxy.glsl"
@@ -40,6 +43,12 @@ void main() {
         out_bits(0u, maps.x);
         out_bits(1u, maps.y);
         out1(2u, weight);
+        break;
+    }
+    case 4u: {  // discs and reflectivities
+        out1(0u, gather_disc(in1(0u)));
+        out1(1u, gather_disc(in1(1u) / in1(2u)));
+        out1(2u, gather_reflectivity(in1(3u), in1(4u)));
         break;
     }
     }

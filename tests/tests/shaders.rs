@@ -47,6 +47,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("twin_random.comp", "SpecConstantOp"),
     ("raster/omni_shadow_look_up.comp", "SpecConstantOp"),
     ("maps/gather.comp", "SpecConstantOp"),
+    ("maps/impostor_layouts.comp", "SpecConstantOp"),
     ("maps/impostor_search.comp", "SpecConstantOp"),
     ("maps/directional_border.comp", "SpecConstantOp"),
     ("maps/directional_coarser.comp", "SpecConstantOp"),

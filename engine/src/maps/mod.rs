@@ -65,6 +65,14 @@ pub use image::MapImage;
 use glam::{DVec2, DVec3, UVec2};
 use std::f64::consts::PI;
 
+/// By how much the length of a direction may be off 1.
+const UNIT_SLACK: f64 = 1e-4;
+
+/// Whether a direction is a unit vector, as rays and axes of lobes have to be.
+fn is_unit(direction: DVec3) -> bool {
+    (direction.length() - 1.0).abs() <= UNIT_SLACK
+}
+
 /// A map of directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Parametrization {

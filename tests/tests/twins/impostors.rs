@@ -1,5 +1,6 @@
-//! Impostors: proxies, directions, steps of searches and the choice of maps.
+//! Impostors and gathers: proxies, directions, steps of searches, the choice of maps, solid angles and reflectivities.
 
+use clerestory::maps::gather::{Reflectivity, SolidAngleForm, gather_solid_angle};
 use clerestory::maps::impostor::places::blended_maps;
 use clerestory::maps::impostor::proxy::{box_proxy, hemisphere_proxy, mirrored, refracted, sphere_proxy};
 use clerestory::maps::impostor::{impostor_plane, impostor_step};
@@ -8,7 +9,7 @@ use clerestory_tests::twin::{Tolerance, U, compare};
 use clerestory_tests::{twin_kernel, with_gpu};
 use glam::{DVec3, Vec3};
 
-use crate::{cases, direction, join, list, ulps, v3};
+use crate::{cases, direction, join, list, shift, ulps, v3};
 
 twin_kernel!(twin_impostor);
 
@@ -131,6 +132,54 @@ fn steps_and_planes_agree_with_their_twins() {
             ]
         });
         println!("steps: {worst:.3} of what is allowed");
+    });
+}
+
+#[test]
+fn discs_and_reflectivities_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let lobe = Reflectivity::new(20.0).expect("table");
+        let edges = [0.0, 1e-30, 1e-7, 1.0, 1e9, 6e37, 3.4e38, f32::INFINITY];
+        let table = cases(75, |r: &mut Random| {
+            let t = if r.below(3) == 0 {
+                r.choose(&edges)
+            } else {
+                r.range(0.0, 50.0)
+            };
+            // A quotient that overflows, one that is 0, and the ones that there are.
+            let [area, squared] = r.choose(&[[1e20, 1e-25], [1e-30, 1e30], [0.3, 0.7], [2.0, 1e-3]]);
+            join(&[&[
+                t,
+                area,
+                squared,
+                r.unit(),
+                r.choose(&[1.0, -1.0, 0.9999, 0.0]) * r.unit(),
+            ]])
+        });
+        let results = twin_impostor(gpu, 4, &table, lobe.values());
+        let discs = compare("discs", &table, &results, ulps(16.0, 0.0, 0.0), 0..0, |x| {
+            let of_disc = |area: f64, squared: f64| {
+                // As f32 has it.
+                let area = if area / squared > f64::from(f32::MAX) {
+                    f64::INFINITY
+                } else {
+                    area
+                };
+                gather_solid_angle(SolidAngleForm::Disc, area, squared, 1.0)
+            };
+            vec![of_disc(x[0], 1.0), of_disc(x[1], x[2])]
+        });
+        // A table of numbers up to 3.3, in steps of up to half of one over a part of 63 in all.
+        let reflectivities: Vec<_> = results.iter().map(|results| shift(results, 2)).collect();
+        let looked_up = compare(
+            "reflectivities",
+            &table,
+            &reflectivities,
+            ulps(8.0, 4.0, 4e-6),
+            3..5,
+            |x| vec![lobe.at(x[3], x[4])],
+        );
+        println!("discs {discs:.3}, reflectivities {looked_up:.3} of what is allowed");
     });
 }
 

@@ -8,6 +8,7 @@ use crate::gpu::shaders::constants::PACKED_NORMAL_BITS;
 use crate::gpu::shaders::maps::gather as kernel;
 use crate::gpu::shaders::types::{GatherPoint as DevicePoint, GatherRecord};
 use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::maps::is_unit;
 use crate::maps::packed_direction::pack_octahedral_nearest;
 use crate::{Error, Result};
 
@@ -15,6 +16,7 @@ use crate::{Error, Result};
 /// without.
 #[derive(Debug)]
 pub struct Gather {
+    gpu: Gpu,
     exponent: f32,
     lights: Buffer,
     count: u32,
@@ -23,23 +25,14 @@ pub struct Gather {
 }
 
 impl Gather {
-    /// Uploads lights, makes the table, and the pipeline: specialized by form, terms, and whether there is a table.
+    /// Uploads lights, makes the table, and the pipeline: specialized by the lights' form, terms, and whether there is a table.
     ///
     /// # Errors
-    /// [`Error::Setting`] for settings of another form than the lights', for an exponent below 1 or above 64; [`Error::OutOfMemory`],
-    /// [`Error::DeviceLost`].
+    /// [`Error::Setting`] for an exponent below 1 or above 64; [`Error::OutOfMemory`], [`Error::DeviceLost`].
     pub fn new(gpu: &Gpu, lights: &GatherLights, settings: &GatherSettings, exponent: f32) -> Result<Self> {
-        if settings.form != lights.form() {
-            let value = format!("{:?}", settings.form);
-            return Err(Error::setting(
-                "solid angle form",
-                value,
-                format!("is not the lights' {:?}", lights.form()),
-            ));
-        }
         // Refuses exponents that no table has, with a table or without.
         let table = Reflectivity::new(f64::from(exponent))?;
-        let has_normals = settings.form == SolidAngleForm::DiscWithNormals;
+        let has_normals = lights.form() == SolidAngleForm::DiscWithNormals;
         let record = |light: &GatherLight| GatherRecord {
             position: light.position.as_vec3().to_array(),
             area: light.area as f32,
@@ -54,12 +47,13 @@ impl Gather {
         let table = settings.cones.then_some(table);
         let upload = |table: Reflectivity| gpu.buffer_with("gather: reflectivities", Category::Light, table.values());
         Ok(Self {
+            gpu: gpu.clone(),
             exponent,
             count: records.len() as u32,
             lights: gpu.buffer_with("gather: lights", Category::Light, &records)?,
             table: table.map(upload).transpose()?,
             pipeline: gpu.compute_pipeline(&kernel::Spec {
-                gather_form: settings.form.number(),
+                gather_form: lights.form().number(),
                 gather_five: settings.terms != Terms::All,
                 gather_scaled: settings.terms == Terms::Five,
                 gather_cones: settings.cones,
@@ -106,38 +100,42 @@ impl Gather {
         let groups = self.pipeline.groups_over(count);
         pass.dispatch(&self.pipeline, &[&set], &push, groups)
     }
-}
 
-/// Radiance of points by a gather, in their order: twin [`GatherLights::gather`].
-///
-/// # Errors
-/// [`Error::Setting`] for a point that is not finite or an axis without direction; [`Error::DeviceLost`], [`Error::OutOfMemory`].
-pub fn gathered(gpu: &Gpu, gather: &Gather, points: &[GatherPoint]) -> Result<Vec<DVec3>> {
-    for (i, point) in points.iter().enumerate() {
-        if !(point.position.is_finite() && point.axis.is_finite() && point.axis != DVec3::ZERO) {
-            let cause = "is not finite, or its axis has no direction";
-            return Err(Error::setting(format!("point {i}"), format!("{point:?}"), cause));
+    /// Radiance of points, in their order: twin [`GatherLights::gather`].
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a point that is not finite in f32, and an axis that is no unit vector; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn gather(&self, points: &[GatherPoint]) -> Result<Vec<DVec3>> {
+        for (i, point) in points.iter().enumerate() {
+            let refused = |cause: &str| Err(Error::setting(format!("point {i}"), format!("{point:?}"), cause));
+            if !point.position.as_vec3().is_finite() {
+                return refused("is not finite");
+            }
+            if !is_unit(point.axis) {
+                return refused("has an axis that is no unit vector");
+            }
         }
+        if points.is_empty() {
+            return Ok(Vec::new());
+        }
+        let gpu = &self.gpu;
+        let point = |point: &GatherPoint| DevicePoint {
+            position: point.position.as_vec3().to_array(),
+            axis: point.axis.as_vec3().to_array(),
+        };
+        let records: Vec<DevicePoint> = points.iter().map(point).collect();
+        let records = gpu.buffer_with("gather: points", Category::Work, &records)?;
+        let bytes = (points.len() * size_of::<[f32; 3]>()) as u64;
+        let values = gpu.buffer(&BufferDesc::storage("gather: values", bytes, Category::Work))?;
+        let mut recorder = gpu.recorder("gather")?;
+        recorder.pass("gather", |pass| {
+            self.record(pass, records.view(), values.view(), points.len() as u32)
+        })?;
+        recorder.submit()?.wait()?;
+        let values: Vec<[f32; 3]> = gpu.read(values.view(), points.len())?;
+        Ok(values
+            .into_iter()
+            .map(|value| DVec3::from_array(value.map(f64::from)))
+            .collect())
     }
-    if points.is_empty() {
-        return Ok(Vec::new());
-    }
-    let point = |point: &GatherPoint| DevicePoint {
-        position: point.position.as_vec3().to_array(),
-        axis: point.axis.as_vec3().to_array(),
-    };
-    let records: Vec<DevicePoint> = points.iter().map(point).collect();
-    let records = gpu.buffer_with("gather: points", Category::Work, &records)?;
-    let bytes = (points.len() * size_of::<[f32; 3]>()) as u64;
-    let values = gpu.buffer(&BufferDesc::storage("gather: values", bytes, Category::Work))?;
-    let mut recorder = gpu.recorder("gather")?;
-    recorder.pass("gather", |pass| {
-        gather.record(pass, records.view(), values.view(), points.len() as u32)
-    })?;
-    recorder.submit()?.wait()?;
-    let values: Vec<[f32; 3]> = gpu.read(values.view(), points.len())?;
-    Ok(values
-        .into_iter()
-        .map(|value| DVec3::from_array(value.map(f64::from)))
-        .collect())
 }

@@ -51,11 +51,18 @@ pub enum Terms {
     FiveUnscaled,
 }
 
+/// The lobe of a gather, (s + 1)/(2π) max(0, cos)ˢ about a point's axis, and where a light's reflectivity is taken of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Lobe<'a> {
+    /// In the direction of the light's middle, of this exponent s.
+    Middles(f64),
+    /// As its mean over the light's cone, of the table's exponent.
+    Cones(&'a Reflectivity),
+}
+
 /// Settings of a gather.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GatherSettings {
-    /// How solid angles are carried over. That of the lights, which are made for it.
-    pub form: SolidAngleForm,
     /// Which lights count.
     pub terms: Terms,
     /// Whether reflectivities are means over cones from a table, or those of the lights' middles.
@@ -105,11 +112,11 @@ pub fn gather_solid_angle(form: SolidAngleForm, area: f64, squared: f64, cosine:
     }
 }
 
-/// 2π (1 − 1/√(1 + t)), without the difference that cancels for small t.
+/// 2π (1 − 1/√(1 + t)), without the difference that cancels for small t, and without products that overflow for great ones.
 fn disc(t: f64) -> f64 {
     let root = (1.0 + t).sqrt();
     if t < f64::INFINITY {
-        TAU * t / (root * (root + 1.0))
+        TAU / (root + 1.0) * (t / root)
     } else {
         TAU
     }
@@ -118,17 +125,18 @@ fn disc(t: f64) -> f64 {
 impl GatherLights {
     /// Lights of `side`² texels of each layer, from radiance and distances of the same map, whose own texels are a multiple of it.
     ///
-    /// Where more than half of a texel's solid angle is sky, the light is as far as the sky; else its position and normal are those of what is near.
+    /// Where more than half of a texel's solid angle is sky, the light is as far as the sky; else its position and normal are the means of those of all
+    /// surfaces in the texel, so that over one plane it lies on it, and over a silhouette between what is near and what is far.
     ///
     /// # Errors
     /// [`Error::Setting`] for maps that differ, that have other than square layers or that the side does not divide, for sides of 0 or above 64, for
-    /// impostors of several layers, for a form that takes normals of an impostor without, and for radiance that is not finite and at least 0.
+    /// one texel alone, which lies about the map's place, for impostors of several layers, for a form that takes normals of an impostor without, and for radiance that is not finite and at least 0.
     pub fn new(radiance: &MapImage, impostor: &ImpostorImage, side: u32, form: SolidAngleForm) -> Result<Self> {
         Self::of(radiance, impostor, side, form, false)
     }
 
     /// As [`GatherLights::new`], with lights where they were published to be: at the mean of all distances in the direction of the texel's middle, with the mean
-    /// radiance of equal weights. At silhouettes they float between what is near and what is far.
+    /// radiance of equal weights. Over planes they lie off them; over silhouettes they are where [`GatherLights::new`] has them too.
     ///
     /// # Errors
     /// As [`GatherLights::new`].
@@ -161,6 +169,10 @@ impl GatherLights {
         }
         if !(1..=MAX_SIDE).contains(&side) || !size.x.is_multiple_of(side) {
             let cause = format!("is not in 1..={MAX_SIDE}, or does not divide {}", size.x);
+            return Err(Error::setting("side of lights", side, cause));
+        }
+        if side == 1 && map.layers() == 1 {
+            let cause = format!("is one light about the place of a {map}; at least 2");
             return Err(Error::setting("side of lights", side, cause));
         }
         if impostor.layers() != 1 {
@@ -208,9 +220,8 @@ impl GatherLights {
         &self.solid_angles
     }
 
-    /// Radiance by the normalised lobe about a point's axis, from all lights or the five greatest; the irradiance over π for an exponent of 1 about a
-    /// normal. `table` has the means over cones of that exponent, or is `None` for the lights' middles.
-    pub fn gather(&self, point: &GatherPoint, exponent: f64, terms: Terms, table: Option<&Reflectivity>) -> DVec3 {
+    /// Radiance by the lobe about a point's axis, from all lights or the five greatest; the irradiance over π for an exponent of 1 about a normal.
+    pub fn gather(&self, point: &GatherPoint, lobe: Lobe<'_>, terms: Terms) -> DVec3 {
         let term = |light: &GatherLight| {
             let v = light.position - point.position;
             let squared = v.length_squared();
@@ -219,9 +230,9 @@ impl GatherLights {
             };
             let angle = gather_solid_angle(self.form, light.area, squared, -light.normal.dot(direction));
             let cosine = point.axis.dot(direction);
-            let reflectivity = match table {
-                Some(table) => table.at(1.0 - angle / TAU, cosine),
-                None => (exponent + 1.0) / TAU * cosine.max(0.0).powf(exponent),
+            let reflectivity = match lobe {
+                Lobe::Cones(table) => table.at(1.0 - angle / TAU, cosine),
+                Lobe::Middles(exponent) => (exponent + 1.0) / TAU * cosine.max(0.0).powf(exponent),
             };
             reflectivity * angle
         };
@@ -248,9 +259,9 @@ impl GatherLights {
         }
     }
 
-    /// Irradiance about a point's axis, W·m⁻² where radiance is in W·m⁻²·sr⁻¹: π times the gather by an exponent of 1.
-    pub fn irradiance(&self, point: &GatherPoint, table: Option<&Reflectivity>) -> DVec3 {
-        PI * self.gather(point, 1.0, Terms::All, table)
+    /// Irradiance about a point's axis, W·m⁻² where radiance is in W·m⁻²·sr⁻¹: π times the gather by an exponent of 1 at the lights' middles.
+    pub fn irradiance(&self, point: &GatherPoint) -> DVec3 {
+        PI * self.gather(point, Lobe::Middles(1.0), Terms::All)
     }
 }
 

@@ -83,6 +83,28 @@ impl LitRoom {
         sum + (self.patch - self.walls[3]) * polygon(corners, point)
     }
 
+    /// Radiance of points by the normalised lobe of an exponent about their axes: sums over the directions of `side`² texels of each face of a cube about
+    /// each point, of what is seen there. Off by the patch's border, which a texel sees or does not.
+    pub fn glossy(&self, points: &[GatherPoint], exponent: f64, side: u32) -> Vec<f64> {
+        let (map, size) = (Parametrization::Cube, UVec2::splat(side));
+        let directions: Vec<(DVec3, f64)> = map
+            .texels(size)
+            .filter_map(|texel| Some((map.texel_direction(size, texel)?, map.texel_solid_angle(size, texel))))
+            .collect();
+        let value = |point: &GatherPoint| {
+            let seen = |(direction, solid_angle): &(DVec3, f64)| {
+                let cosine = point.axis.dot(*direction);
+                if cosine <= 0.0 {
+                    return 0.0;
+                }
+                let hit = point.position + BoxRoom::EMPTY.hit(point.position, *direction) * *direction;
+                cosine.powf(exponent) * solid_angle * self.radiance(hit)
+            };
+            (exponent + 1.0) / TAU * directions.iter().map(seen).sum::<f64>()
+        };
+        points.iter().map(value).collect()
+    }
+
     /// Points of a sphere at a place of the room, evenly over it.
     pub fn points(place: DVec3, count: u32) -> Vec<GatherPoint> {
         let golden = PI * (3.0 - 5f64.sqrt());
@@ -98,15 +120,36 @@ impl LitRoom {
         (0..count).map(point).collect()
     }
 
-    /// Radiance and distances of the room in a map of so many texels a side.
+    /// Mean radiance, over the wall, of what a cube's texel of `width` half widths about a direction shows: of those over the patch's border, by the
+    /// part of the texel's square that lies in it.
+    fn radiance_of_texel(&self, direction: DVec3, width: f64) -> f64 {
+        let point = direction / direction.abs().max_element();
+        if point.y > -1.0 {
+            return self.radiance(direction);
+        }
+        let [x, z, half] = self.patch_at;
+        let overlap = |at: f64, middle: f64| {
+            let low = (at - 0.5 * width).max(middle - half);
+            let high = (at + 0.5 * width).min(middle + half);
+            (high - low).max(0.0) / width
+        };
+        let part = overlap(point.x, x) * overlap(point.z, z);
+        self.walls[3] + part * (self.patch - self.walls[3])
+    }
+
+    /// Radiance and distances of the room in a map of so many texels a side. A cube's texels have the mean over their squares on the walls, so that the patch
+    /// has its whole light and no more; other maps' have the radiance of their centres.
     ///
     /// # Errors
     /// As [`MapImage::from_fn`] and [`ImpostorImage::from_fn`].
     pub fn maps(&self, map: Parametrization, side: u32) -> Result<(MapImage, ImpostorImage)> {
         let size = UVec2::splat(side);
+        let of = |direction: DVec3| match map {
+            Parametrization::Cube => self.radiance_of_texel(direction, 2.0 / f64::from(side)),
+            _ => self.radiance(direction),
+        };
         let radiance = MapImage::from_fn(map, size, |texel| {
-            let direction = map.texel_direction(size, texel);
-            DVec3::splat(direction.map_or(0.0, |direction| self.radiance(direction)))
+            DVec3::splat(map.texel_direction(size, texel).map_or(0.0, of))
         })?;
         let impostor = ImpostorImage::from_fn(map, size, 1, true, |d| BoxRoom::EMPTY.surfaces(d))?;
         Ok((radiance, impostor))
@@ -140,7 +183,7 @@ pub fn relative_errors(found: &[f64], exact: &[f64]) -> [f64; 2] {
     [100.0 * (squares / count).sqrt() / mean, 100.0 * bias]
 }
 
-/// ∫ max(0, n·ω) dω over a convex polygon.
+/// ∫ max(0, n·ω) dω over a convex polygon, whichever way round its corners are.
 fn polygon(corners: [DVec3; 4], point: &GatherPoint) -> f64 {
     let n = point.axis;
     let seen = corners.map(|corner| corner - point.position);
@@ -165,5 +208,5 @@ fn polygon(corners: [DVec3; 4], point: &GatherPoint) -> f64 {
             sum += length.atan2(a.dot(b)) * n.dot(cross) / length;
         }
     }
-    (PI * sum / TAU).abs()
+    0.5 * sum.abs()
 }

@@ -2,19 +2,20 @@
 //!
 //! Source: L. Szirmay-Kalos, I. Lazányi, "Indirect Diffuse and Glossy Illumination on the GPU", SCCG 2006, which gives the solid angle by the ratio
 //! of squared distances ([`SolidAngleForm::Ratio`]) or by that of a disc ([`SolidAngleForm::Disc`]), both with the surface at the same angle to the
-//! map's place as to the point. Here texels have their exact solid angles at the map's place, positions are averaged instead of distances, and
-//! with normals ([`SolidAngleForm::DiscWithNormals`]) the disc keeps its own angle to the point.
+//! map's place as to the point. Here texels have their exact solid angles at the map's place, positions are averaged instead of distances, so that
+//! lights over a plane lie on it, and with normals ([`SolidAngleForm::DiscWithNormals`]) the disc keeps its own angle to the point.
 //!
 //! A [`GatherLight`] is a texel of the coarse map: mean radiance by solid angle, mean position, and the disc that it is taken for. A [`Gather`]
 //! on the device, and [`GatherLights::gather`] as its twin, sum a lobe's reflectivity times radiance times solid angle over all lights: an exponent of 1
 //! about a normal is irradiance over π, a greater one about the mirrored direction what a glossy surface reflects. The lobe is
-//! normalised, (s + 1)/(2π) max(0, cos)ˢ, without a cosine beside it: surroundings of radiance 1 give 1.
+//! normalised, (s + 1)/(2π) max(0, cos)ˢ, without a cosine beside it: surroundings of radiance 1 give 1 at the map's place.
 //!
 //! - *Reflectivity* at the middle of a light, or its mean over the light's cone from a table of sizes and cosines ([`Reflectivity`]), which also counts
 //!   lights whose middle is below the horizon.
 //! - *Few terms*: the five greatest terms alone, scaled by the lobe's whole over theirs ([`Terms::Five`]).
 //!
-//! Bias: nothing hides a light from the point; radiance is that towards the map's place; each texel is one disc. Without normals the error does not
+//! Bias: nothing hides a light from the point; radiance is that towards the map's place; each texel is one disc, over a silhouette one between what is
+//! near and what is far. Without normals the error does not
 //! vanish with more texels. The work is linear in the number of lights. Deterministic: sums in the order of texels, in blocks of 64.
 
 mod device;
@@ -24,8 +25,10 @@ mod reflectivity;
 #[cfg(test)]
 mod tests;
 
-pub use device::{Gather, gathered};
-pub use lights::{GatherLight, GatherLights, GatherPoint, GatherSettings, SolidAngleForm, Terms, gather_solid_angle};
+pub use device::Gather;
+pub use lights::{
+    GatherLight, GatherLights, GatherPoint, GatherSettings, Lobe, SolidAngleForm, Terms, gather_solid_angle,
+};
 pub use reflectivity::{Reflectivity, cone_reflectivity};
 
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -60,13 +63,20 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::Kernel,
         limits: "Nothing hides a light; without normals the error stays however many texels there are.",
         sources: &[sources::SZIRMAY_KALOS_LAZANYI_2006.whole()],
-        shaders: &["shaders/maps/gather.glsl", "shaders/maps/gather.comp"],
+        shaders: &[
+            "shaders/maps/gather.glsl",
+            "shaders/maps/gather_disc.glsl",
+            "shaders/maps/gather.comp",
+        ],
         bias: Some(ONE_DISC),
         tests: &[
             "engine/src/maps/gather/tests/errors.rs::gathers_err_as_published",
             "engine/src/maps/gather/tests/errors.rs::normals_make_it_converge",
             "engine/src/maps/gather/tests/parts.rs::lights_hold_the_sphere_and_its_light",
             "engine/src/maps/gather/tests/parts.rs::even_surroundings_stay_even",
+            "engine/src/maps/gather/tests/parts.rs::even_surroundings_err_as_published_elsewhere",
+            "engine/src/maps/gather/tests/parts.rs::the_sky_is_far_and_does_not_draw_lights_away",
+            "engine/src/maps/gather/tests/parts.rs::a_light_over_a_silhouette_lies_between",
             "engine/src/maps/gather/tests/parts.rs::bad_maps_and_settings_are_refused_by_name",
             "tests/tests/gathers.rs::gathers_are_their_twins",
             "tests/tests/gathers.rs::the_published_errors_hold_on_the_device",
@@ -84,12 +94,13 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("MET-G3"),
         limits: "Takes the disc's axis through both places, unless normals are stored.",
         sources: &[sources::SZIRMAY_KALOS_LAZANYI_2006.whole()],
-        shaders: &["shaders/maps/gather.glsl"],
+        shaders: &["shaders/maps/gather.glsl", "shaders/maps/gather_disc.glsl"],
         bias: Some(ONE_DISC),
         tests: &[
             "engine/src/maps/gather/tests/parts.rs::solid_angles_are_bounded_and_right_far_away",
             "engine/src/maps/gather/tests/errors.rs::gathers_err_as_published",
             "tests/tests/gathers.rs::gathers_are_their_twins",
+            "tests/tests/twins/impostors.rs::discs_and_reflectivities_agree_with_their_twins",
         ],
         settings: &["clerestory::maps::gather::SolidAngleForm"],
         ..Row::of(file!())
@@ -110,17 +121,19 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-G6",
         name: "reflectivity as its mean over a light's cone, from a table",
         role: Role::PartOf("MET-G3"),
-        limits: "Cones up to a hemisphere; between 64 sizes and 64 cosines it is bilinear.",
+        limits: "Cones up to a hemisphere; between 64 sizes and 64 angles it is bilinear.",
         sources: &[sources::SZIRMAY_KALOS_LAZANYI_2006.whole()],
-        shaders: &["shaders/maps/gather.glsl"],
+        shaders: &["shaders/maps/gather_disc.glsl"],
         bias: Some(ONE_DISC),
         tests: &[
             "engine/src/maps/gather/tests/parts.rs::means_over_cones_are_the_published_ones",
+            "engine/src/maps/gather/tests/parts.rs::narrow_lobes_keep_their_light_in_the_table",
             "engine/src/maps/gather/tests/errors.rs::cones_leave_no_spots_at_a_wall",
             "tests/tests/gathers.rs::gathers_are_their_twins",
+            "tests/tests/twins/impostors.rs::discs_and_reflectivities_agree_with_their_twins",
         ],
         api: &["clerestory::maps::gather::Reflectivity"],
-        settings: &["clerestory::maps::gather::GatherSettings"],
+        settings: &["clerestory::maps::gather::Lobe"],
         ..Row::of(file!())
     },
     Row {

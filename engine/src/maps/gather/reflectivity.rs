@@ -10,10 +10,11 @@ use crate::{Error, Result};
 /// Rings of a cone, and points of a half ring.
 const RINGS: u32 = 64;
 const POINTS: u32 = 32;
-/// Greatest exponent of a lobe: narrower ones fall between the cosines of the table.
+/// Greatest exponent of a lobe. Rows of the table are 1.8° apart about the lobe's axis: its light over all directions is 1 within a hundredth.
 const MAX_EXPONENT: f64 = 64.0;
 
-/// Means of a normalised lobe over cones, by the cosine of the cone's half angle and that of its axis with the lobe's.
+/// Means of a normalised lobe over cones, by the cosine of the cone's half angle and by half the distance of two points on the unit sphere, √((1 − c)/2) of
+/// the cosine c of the cone's axis with the lobe's: evenly fine in angle about the lobe's axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reflectivity {
     exponent: f64,
@@ -71,8 +72,8 @@ impl Reflectivity {
         let side = GATHER_TABLE_SIDE;
         let last = f64::from(side - 1);
         let value = |i: u32| {
-            let (cone, axis) = (f64::from(i % side) / last, 2.0 * f64::from(i / side) / last - 1.0);
-            cone_reflectivity(exponent, cone, axis) as f32
+            let (cone, apart) = (f64::from(i % side) / last, f64::from(i / side) / last);
+            cone_reflectivity(exponent, cone, 1.0 - 2.0 * apart * apart) as f32
         };
         Ok(Self {
             exponent,
@@ -85,16 +86,16 @@ impl Reflectivity {
         self.exponent
     }
 
-    /// Rows of cosines with the lobe's axis from −1 to 1, each over cosines of half angles from 0 to 1.
+    /// Rows from the lobe's axis to its opposite, by √((1 − c)/2) from 0 to 1, each over cosines of half angles from 0 to 1.
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// The mean over a cone, bilinear in both cosines: twin of `gather_reflectivity`.
+    /// The mean over a cone, by the cosines of its half angle and of its axis with the lobe's, bilinear between entries: twin of `gather_reflectivity`.
     pub fn at(&self, cone: f64, axis: f64) -> f64 {
         let side = GATHER_TABLE_SIDE as usize;
         let last = (side - 1) as f64;
-        let place = last * DVec2::new(cone.clamp(0.0, 1.0), (0.5 * axis + 0.5).clamp(0.0, 1.0));
+        let place = last * DVec2::new(cone.clamp(0.0, 1.0), (0.5 - 0.5 * axis).clamp(0.0, 1.0).sqrt());
         let corner = place.floor().min(DVec2::splat(last - 1.0));
         let part = place - corner;
         let first = corner.y as usize * side + corner.x as usize;

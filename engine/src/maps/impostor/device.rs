@@ -4,12 +4,14 @@ use glam::DVec3;
 
 use super::super::Parametrization;
 use super::super::directional_map::kind;
+use super::search::is_ray;
 use super::settings::ImpostorSettings;
 use super::{ImpostorHit, ImpostorImage, ImpostorRay};
 use crate::gpu::shaders::maps::impostor_search as kernel;
 use crate::gpu::shaders::sets::ImpostorSet;
 use crate::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery, ImpostorShape};
 use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::maps::is_unit;
 use crate::{Error, Result};
 
 /// Distances and normals of an [`ImpostorImage`] in the device's memory: four bytes a texel and layer, and as many again for normals.
@@ -28,8 +30,11 @@ impl Impostor {
     /// Uploads an image.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] for one whose distances do not fit a storage buffer's range; [`Error::OutOfMemory`], [`Error::DeviceLost`].
+    /// [`Error::LimitExceeded`] for one whose distances do not fit a storage buffer's range; [`Error::Setting`] for a map that no kernel looks up;
+    /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
     pub fn new(gpu: &Gpu, image: &ImpostorImage) -> Result<Self> {
+        let kind =
+            kind(image.map()).ok_or_else(|| Error::setting("map", image.map(), "has no impostors on the device"))?;
         let limit = gpu.caps().max_storage_buffer_range;
         let bytes = size_of_val(image.distances()) as u64;
         if bytes > limit {
@@ -49,8 +54,7 @@ impl Impostor {
         Ok(Self {
             gpu: gpu.clone(),
             map: image.map(),
-            // An image has a map of those that there are.
-            kind: kind(image.map()).unwrap_or_default(),
+            kind,
             layers: image.layers(),
             shape: gpu.buffer_with("impostor: shape", Category::Light, &[shape])?,
             distances: gpu.buffer_with("impostor: distances", Category::Light, image.distances())?,
@@ -86,8 +90,8 @@ impl Impostor {
     /// What rays meet, in their order: twin [`ImpostorImage::search`].
     ///
     /// # Errors
-    /// [`Error::Setting`] for settings out of range, and for a ray that is not finite or has no direction; [`Error::DeviceLost`],
-    /// [`Error::OutOfMemory`].
+    /// [`Error::Setting`] for settings out of range, for a ray whose direction is no unit vector, and for one that does not begin nearer than
+    /// [`ImpostorImage::NOTHING`]; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn search(&self, rays: &[ImpostorRay], settings: &ImpostorSettings) -> Result<Vec<ImpostorHit>> {
         self.search_timed(rays, settings).map(|(hits, _)| hits)
     }
@@ -98,26 +102,10 @@ impl Impostor {
     /// As [`Impostor::search`].
     pub fn search_timed(&self, rays: &[ImpostorRay], settings: &ImpostorSettings) -> Result<(Vec<ImpostorHit>, f64)> {
         let search = ImpostorSearch::new(&self.gpu, self, settings)?;
-        for (i, ray) in rays.iter().enumerate() {
-            if !(ray.origin.is_finite() && ray.direction.is_finite()) {
-                return Err(Error::setting(format!("ray {i}"), format!("{ray:?}"), "is not finite"));
-            }
-            if ray.direction == DVec3::ZERO {
-                return Err(Error::setting(
-                    format!("ray {i}"),
-                    format!("{ray:?}"),
-                    "has no direction",
-                ));
-            }
-        }
+        let queries = queries(rays)?;
         if rays.is_empty() {
             return Ok((Vec::new(), 0.0));
         }
-        let query = |ray: &ImpostorRay| ImpostorQuery {
-            origin: ray.origin.as_vec3().to_array(),
-            direction: ray.direction.as_vec3().to_array(),
-        };
-        let queries: Vec<ImpostorQuery> = rays.iter().map(query).collect();
         let queries = self.gpu.buffer_with("impostor: rays", Category::Work, &queries)?;
         let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
         let hits = self
@@ -137,6 +125,25 @@ impl Impostor {
         };
         Ok((hits.into_iter().map(hit).collect(), seconds))
     }
+}
+
+/// Rays as kernels read them; refuses those that no search follows, by name.
+pub(super) fn queries(rays: &[ImpostorRay]) -> Result<Vec<ImpostorQuery>> {
+    let query = |(i, ray): (usize, &ImpostorRay)| {
+        if is_unit(ray.direction) && is_ray(ray) {
+            return Ok(ImpostorQuery {
+                origin: ray.origin.as_vec3().to_array(),
+                direction: ray.direction.as_vec3().to_array(),
+            });
+        }
+        let cause = if is_unit(ray.direction) {
+            format!("does not begin nearer than {:e}", ImpostorImage::NOTHING)
+        } else {
+            "has a direction that is no unit vector".into()
+        };
+        Err(Error::setting(format!("ray {i}"), format!("{ray:?}"), cause))
+    };
+    rays.iter().enumerate().map(query).collect()
 }
 
 /// A search on the device: a kernel over rays, specialized by the method, its steps, the map, its layers and whether it has normals.

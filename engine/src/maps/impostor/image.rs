@@ -10,7 +10,7 @@ use crate::{Error, Result};
 /// A surface that is seen in a direction from the map's place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpostorSurface {
-    /// Distance from the map's place, above 0.
+    /// Distance from the map's place, at least [`ImpostorImage::LEAST`].
     pub distance: f64,
     /// Normal of any length, to either side.
     pub normal: DVec3,
@@ -69,12 +69,14 @@ pub fn impostor_plane(distance: f64, at_centre: f64, at_direction: f64) -> f64 {
 impl ImpostorImage {
     /// The distance that stands where there is no surface, in the unit of lengths: finite, so that ratios of it are.
     pub const NOTHING: f32 = IMPOSTOR_NOTHING;
+    /// The least distance of a surface: ratios to it are finite too.
+    pub const LEAST: f32 = 1e-16;
 
     /// An impostor of its texels: layer of surfaces by layer, each layer by layer of the map, row by row.
     ///
     /// # Errors
     /// [`Error::Setting`] for maps of discs and perspective octahedra, sizes that the map cannot have, no layers or more than eight, numbers of
-    /// texels that do not fit, distances that are not above 0 and finite or lie before those of the last layer, and normals without direction.
+    /// texels that do not fit, distances that are below [`LEAST`](Self::LEAST) or not finite or lie before those of the last layer, and normals without direction.
     pub fn new(
         map: Parametrization,
         size: UVec2,
@@ -97,8 +99,9 @@ impl ImpostorImage {
             Error::setting(format!("impostor {what} of texel {i}"), value, cause)
         };
         for (i, distance) in distances.iter().enumerate() {
-            if !(*distance > 0.0 && distance.is_finite()) {
-                return Err(wrong(i, "distance", distance.to_string(), "is not above 0 and finite"));
+            if !(*distance >= Self::LEAST && distance.is_finite()) {
+                let cause = format!("is below {:e}, or not finite", Self::LEAST);
+                return Err(wrong(i, "distance", distance.to_string(), &cause));
             }
             if i >= of_layer && *distance < distances[i - of_layer] {
                 return Err(wrong(

@@ -10,15 +10,18 @@
 //! - [`ImpostorImage`]: distances and normals on the host, [`Impostor`] on the device;
 //! - [`ImpostorSettings`]: the method and its steps; [`ImpostorImage::search`] and [`Impostor::search`]: what rays meet, one by one and in batches;
 //! - [`proxy`]: spheres, boxes and a hemisphere in place of distances; [`places`]: which maps serve a point;
-//! - [`room`]: rooms with exact answers, which searches are measured by.
+//! - [`room`]: rooms with exact answers, which searches are measured by; [`layouts`]: what the layout of texels is measured by.
 //!
-//! Guarantees: deterministic, each ray by itself; every number in a result is finite for finite rays. The residual |1 − g| of a result says
+//! Guarantees: deterministic, each ray by itself; every number in a result is finite, for rays of any numbers: one whose direction is no unit vector, or that
+//! begins as far as [`ImpostorImage::NOTHING`], finds nothing, and batches refuse it by name. The residual |1 − g| of a result says
 //! how far, relatively, the point that was found is from a surface: above a few hundredths no surface was found.
 //!
 //! Bias: what o does not see is not there. Behind a silhouette the search sticks to its edge, which the residual shows, and false position may
-//! return a later hit than the first; [`SearchMethod::March`] returns the first, and several layers hold what lies behind. A texel's distance
+//! return a later hit than the first. [`SearchMethod::March`] returns the first crossing whose residual is below the tolerance: the first hit where o
+//! sees it, and where it is hidden a later surface; several layers hold what lies behind. A texel's distance
 //! holds for its centre: with normals look-ups go on along its plane, without they are off by up to half a texel.
 
+pub mod layouts;
 pub mod places;
 pub mod proxy;
 pub mod room;
@@ -88,7 +91,10 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/edges.rs::zero_vectors_and_numbers_that_are_none_find_nothing",
             "engine/src/maps/impostor/tests/searches.rs::texels_with_normals_give_what_exact_rooms_do",
             "engine/src/maps/impostor/tests/searches.rs::texels_without_normals_are_off_by_less_than_a_texel",
-            "tests/tests/impostors.rs::every_method_is_its_twin_to_the_bit_over_runs",
+            "engine/src/maps/impostor/tests/edges.rs::all_numbers_stay_finite",
+            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
+            "tests/tests/impostors.rs::every_map_agrees_with_its_twin_with_normals_and_without",
+            "tests/tests/impostors.rs::rays_that_are_none_find_nothing_in_the_kernel",
             "tests/tests/impostors.rs::the_sky_is_seen_in_the_rays_own_direction",
             "tests/tests/impostors.rs::what_cannot_be_searched_is_refused_by_name",
         ],
@@ -111,7 +117,7 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
-            "tests/tests/impostors.rs::every_method_is_its_twin_to_the_bit_over_runs",
+            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -138,13 +144,13 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-D4",
         name: "secant from the ray's own point",
         role: Role::PartOf("MET-D1"),
-        limits: "Diverges in corners for every seventh ray, for good.",
+        limits: "Goes back to its start in corners for every seventh ray, and stays there.",
         sources: &[sources::SZIRMAY_KALOS_2005.whole()],
         shaders: &["shaders/maps/impostor.glsl"],
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
-            "tests/tests/impostors.rs::every_method_is_its_twin_to_the_bit_over_runs",
+            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -159,7 +165,7 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
-            "tests/tests/impostors.rs::every_method_is_its_twin_to_the_bit_over_runs",
+            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -220,14 +226,16 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-D9",
         name: "distances in a buffer of their own, beside radiance and normals",
         role: Role::PartOf("MET-D1"),
-        limits: "Says nothing of speed by itself.",
+        limits: "What it is measured against, four numbers a texel with the distance as the fourth, is there for cubes of one layer without normals alone.",
         sources: &[sources::SZIRMAY_KALOS_2005.whole()],
-        shaders: &["shaders/maps/impostor_set.glsl"],
+        shaders: &["shaders/maps/impostor_set.glsl", "shaders/maps/impostor_layouts.comp"],
         bias: None,
         tests: &[
             "tests/tests/impostors.rs::distances_have_a_buffer_of_their_own",
+            "tests/tests/impostors.rs::layouts_show_the_same_radiance",
             "engine/src/maps/impostor/tests/edges.rs::distances_are_never_averaged",
         ],
+        api: &["clerestory::maps::impostor::layouts::ImpostorLayouts"],
         ..Row::of(file!())
     },
     Row {
@@ -247,9 +255,9 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "MET-D11",
-        name: "march to the first crossing, then bisection",
+        name: "march to the first crossing that is a surface, then bisection",
         role: Role::PartOf("MET-D1"),
-        limits: "What is thinner than a step is stepped over.",
+        limits: "What is thinner than a step is stepped over; where the first hit is hidden, a later surface is found.",
         sources: &[
             sources::UMENHOFFER_2007.at("chapter 17"),
             sources::POLICARPO_2005.whole(),
@@ -258,8 +266,11 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::hidden_surfaces_give_the_published_errors",
+            "engine/src/maps/impostor/tests/searches.rs::the_first_crossing_errs_as_published",
             "engine/src/maps/impostor/tests/edges.rs::a_march_finds_the_first_hit_where_brackets_find_a_later_one",
+            "engine/src/maps/impostor/tests/edges.rs::a_march_begins_in_front_of_coarse_texels",
             "tests/tests/impostors.rs::three_layers_hold_what_lies_behind",
+            "tests/tests/impostors.rs::a_march_begins_in_front_of_coarse_texels",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::proxy::sphere_proxy;
 use super::settings::{ImpostorSettings, SearchMethod};
 use super::{ImpostorHit, ImpostorImage, ImpostorRay};
-use crate::gpu::shaders::constants::{IMPOSTOR_FLAT, IMPOSTOR_MARGIN};
+use crate::gpu::shaders::constants::{IMPOSTOR_FLAT, IMPOSTOR_MARGIN, IMPOSTOR_UNIT};
 
 const NOTHING: f64 = ImpostorImage::NOTHING as f64;
 
@@ -114,7 +114,7 @@ fn by_steps<F: Fn(u32, DVec3) -> f64>(
     d
 }
 
-/// The guess of the first crossing that is one of a surface, by even steps and bisection; of none, the end where that is in front of everything,
+/// The guess of the first crossing whose residual is below the tolerance, by even steps and bisection; of none, the end where that is in front of everything,
 /// or else the crossing of the least residual.
 fn by_march<F: Fn(u32, DVec3) -> f64>(
     scene: &ImpostorScene<F>,
@@ -125,14 +125,20 @@ fn by_march<F: Fn(u32, DVec3) -> f64>(
     let margin = f64::from(IMPOSTOR_MARGIN);
     let [nearest, farthest] = scene.extent;
     let is_inside = ray.origin.length() < nearest;
-    let begin = if is_inside {
+    let mut begin = if is_inside {
         (1.0 - margin) * sphere_proxy(ray.origin, ray.direction, nearest)
     } else {
         0.0
     };
+    let mut g_low = ratio(scene, layer, ray, begin);
+    if begin > 0.0 && g_low >= 1.0 {
+        // Between the centres of coarse texels the surface is nearer than at any of them.
+        begin = 0.0;
+        g_low = ratio(scene, layer, ray, begin);
+    }
     let end = (1.0 + margin) * sphere_proxy(ray.origin, ray.direction, farthest);
     let step = (end - begin).max(0.0) / f64::from(settings.steps);
-    let (mut low, mut g_low) = (begin, ratio(scene, layer, ray, begin));
+    let mut low = begin;
     let (mut best, mut least) = (end, f64::INFINITY);
     for i in 0..settings.steps {
         let high = begin + f64::from(i + 1) * step;
@@ -162,7 +168,14 @@ fn by_march<F: Fn(u32, DVec3) -> f64>(
     if g_low < 1.0 { end } else { best }
 }
 
-/// What a ray meets, by the surfaces that are seen from the map's place. A direction of length 0 or a number that is not finite finds nothing.
+/// Whether a search can follow a ray: squares and quotients of what it meets stay finite, in f32 too.
+pub(super) fn is_ray(ray: &ImpostorRay) -> bool {
+    let is_unit = (ray.direction.length_squared() - 1.0).abs() < f64::from(IMPOSTOR_UNIT);
+    is_unit && ray.origin.abs().cmplt(DVec3::splat(NOTHING)).all()
+}
+
+/// What a ray meets, by the surfaces that are seen from the map's place. A direction that is no unit vector, and an origin that is not nearer than
+/// [`ImpostorImage::NOTHING`] in each coordinate, find nothing.
 pub fn impostor_search<F: Fn(u32, DVec3) -> f64>(
     scene: &ImpostorScene<F>,
     ray: &ImpostorRay,
@@ -175,7 +188,7 @@ pub fn impostor_search<F: Fn(u32, DVec3) -> f64>(
         residual: 1.0,
         layer: 0,
     };
-    if !(r.length_squared() > 0.0 && r.is_finite() && x.is_finite()) {
+    if !is_ray(ray) {
         return nowhere;
     }
     if settings.method == SearchMethod::Classical {

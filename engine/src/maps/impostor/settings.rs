@@ -28,7 +28,8 @@ pub enum SearchMethod {
     /// False position where the map's place sees x, g(0) ≤ 1; mixed elsewhere, where x is no bracket.
     #[default]
     Hybrid,
-    /// Even steps to the first crossing, then bisection: the first hit, not any.
+    /// Even steps to the first crossing, then bisection of it; where its residual is not below the tolerance, a jump at a silhouette, on to the next. The
+    /// first hit where the map's place sees it; where it is hidden, a later surface.
     March,
 }
 
@@ -87,7 +88,8 @@ pub struct ImpostorSettings {
     pub steps: u32,
     /// Halvings of the interval that holds a crossing of a march, 0 to 24.
     pub bisections: u32,
-    /// Residual |1 − g| below which a crossing is one of a surface and not a jump at a silhouette, above 0 and below 1.
+    /// Residual |1 − g| below which a crossing is one of a surface and not a jump at a silhouette, above 0 and below 1. Close to 1, a march ends at the first
+    /// crossing, be it a jump.
     pub tolerance: f32,
 }
 

@@ -6,8 +6,8 @@ use glam::{UVec2, Vec3};
 
 use super::super::{cone_reflectivity, gather_solid_angle};
 use super::*;
-use crate::maps::impostor::ImpostorImage;
 use crate::maps::impostor::room::BoxRoom;
+use crate::maps::impostor::{ImpostorImage, ImpostorSurface};
 use crate::maps::{MapImage, Parametrization};
 use SolidAngleForm::{Disc, DiscWithNormals, Ratio};
 
@@ -20,6 +20,9 @@ fn solid_angles_are_bounded_and_right_far_away() {
         let at = |squared: f64| gather_solid_angle(Disc, area, squared, 1.0);
         assert!((at(4.0) - solid_angle).abs() < 1e-12);
         assert!((at(1e-12) - TAU).abs() < 1e-4 && at(0.0) == TAU);
+        // Where the quotient, or what it is multiplied with, leaves the numbers.
+        assert!((at(1e-307) - TAU).abs() < 1e-12 && at(1e-320) == TAU);
+        assert_eq!(gather_solid_angle(DiscWithNormals, area, 0.0, 0.0), 0.0);
         let far = at(4e6) * 1e6 / (area / 4.0 * std::f64::consts::PI);
         assert!((far - 1.0).abs() < 1e-5, "{far}");
         // At half the cosine, the solid angle of half the area; from behind nothing.
@@ -92,23 +95,36 @@ fn lights_hold_the_sphere_and_its_light() {
     }
 }
 
-/// Positions are averaged, distances are not; where most is sky a light is as far as the sky.
-#[test]
-fn silhouettes_do_not_move_lights_and_the_sky_is_far() {
-    let map = Parametrization::Cube;
-    let size = UVec2::splat(8);
-    // Three quarters of one face.
-    let near_half = |d: DVec3| d.z > d.x.abs().max(d.y.abs()) && (d.x > 0.0 || d.y < 0.0);
+/// One light a face of a cube, whose +z shows a surface at each direction's distance, and whose other faces show the sky.
+fn face_lights(distance: impl Fn(DVec3) -> Option<f64>) -> GatherLights {
+    let (map, size) = (Parametrization::Cube, UVec2::splat(8));
     let impostor = ImpostorImage::from_fn(map, size, 1, false, |d| {
-        let surface = near_half(d).then_some(super::super::super::impostor::ImpostorSurface {
-            distance: 2.0,
+        let is_seen = d.z > d.x.abs().max(d.y.abs());
+        let surface = distance(d).filter(|_| is_seen).map(|distance| ImpostorSurface {
+            distance,
             normal: DVec3::Z,
         });
         surface.into_iter().collect()
     });
-    let impostor = impostor.expect("impostor");
     let radiance = MapImage::from_fn(map, size, |_| DVec3::ONE).expect("radiance");
-    let lights = GatherLights::new(&radiance, &impostor, 1, Disc).expect("lights");
+    GatherLights::new(&radiance, &impostor.expect("impostor"), 1, Disc).expect("lights")
+}
+
+/// A light has the mean of all positions in its texel: on the plane that fills it, and between two that meet at a silhouette, by their solid angles.
+#[test]
+fn a_light_over_a_silhouette_lies_between() {
+    let plane = face_lights(|d| Some(2.0 / d.z));
+    assert!((plane.lights()[4].position - 2.0 * DVec3::Z).length() < 1e-6);
+    let both = face_lights(|d| Some(if d.x > 0.0 { 1.0 } else { 3.0 } / d.z));
+    let position = both.lights()[4].position;
+    assert!((position.z - 2.0).abs() < 1e-6 && position.x < -0.1, "{position}");
+}
+
+/// What is near in a texel places its light, unless most of the texel is sky: then the light is as far as the sky.
+#[test]
+fn the_sky_is_far_and_does_not_draw_lights_away() {
+    // Three quarters of the face.
+    let lights = face_lights(|d| (d.x > 0.0 || d.y < 0.0).then_some(2.0));
     let nothing = f64::from(ImpostorImage::NOTHING);
     for (face, light) in lights.lights().iter().enumerate() {
         let is_near = face == 4;
@@ -117,17 +133,9 @@ fn silhouettes_do_not_move_lights_and_the_sky_is_far() {
     }
     // The sky's light is that at the map's place, wherever the point is, and faces it.
     let [here, there] = [DVec3::ZERO, DVec3::new(3.0, -2.0, 1.0)].map(|position| {
-        lights
-            .gather(
-                &GatherPoint {
-                    position,
-                    axis: DVec3::NEG_Y,
-                },
-                1.0,
-                Terms::All,
-                None,
-            )
-            .x
+        let axis = DVec3::NEG_Y;
+        let point = GatherPoint { position, axis };
+        lights.gather(&point, Lobe::Middles(1.0), Terms::All).x
     });
     assert!(here > 0.3 && there.is_finite() && there > 0.3, "{here} {there}");
 }
@@ -136,18 +144,75 @@ fn silhouettes_do_not_move_lights_and_the_sky_is_far() {
 fn even_surroundings_stay_even() {
     for form in [Ratio, Disc, DiscWithNormals] {
         let lights = LitRoom::EVEN.lights(16, form).expect("lights");
-        for exponent in [1.0, 5.0] {
+        for exponent in [1.0, 5.0, 20.0, 64.0] {
             let table = Reflectivity::new(exponent).expect("table");
-            for table in [None, Some(&table)] {
+            for lobe in [Lobe::Middles(exponent), Lobe::Cones(&table)] {
                 let point = GatherPoint {
                     position: DVec3::ZERO,
                     axis: DVec3::new(0.6, -0.48, 0.64),
                 };
-                let found = lights.gather(&point, exponent, Terms::All, table);
-                assert!((found.x - 1.0).abs() < 5e-3, "{form:?} {exponent}: {found}");
+                let found = lights.gather(&point, lobe, Terms::All).x;
+                println!(
+                    "{form:?}, exponent {exponent}, {}: {found:.5}",
+                    matches!(lobe, Lobe::Cones(_))
+                );
+                assert!((found - 1.0).abs() < 5e-3, "{form:?} {exponent}: {found}");
             }
         }
     }
+}
+
+/// Light of a lobe over all directions, by the table: 1, however small the lights are.
+#[test]
+fn narrow_lobes_keep_their_light_in_the_table() {
+    for exponent in [1.0, 5.0, 10.0, 20.0, 64.0] {
+        let table = Reflectivity::new(exponent).expect("table");
+        for cone in [1.0, 0.998, 0.9, 0.0] {
+            let count = 20_000;
+            let at = |i: u32| table.at(cone, 2.0 * (f64::from(i) + 0.5) / f64::from(count) - 1.0);
+            let sum = 2.0 * TAU * (0..count).map(at).sum::<f64>() / f64::from(count);
+            println!("exponent {exponent}, cone {cone}: {sum:.5}");
+            assert!((sum - 1.0).abs() < 1e-2, "{exponent} {cone}: {sum}");
+        }
+    }
+}
+
+/// Away from the map's place, in surroundings of radiance 1: what was published of spheres of points, as mean, least and greatest.
+#[test]
+fn even_surroundings_err_as_published_elsewhere() {
+    let of = |side: u32, form: SolidAngleForm, place: DVec3| {
+        let lights = LitRoom::EVEN.printed_lights(side, form).expect("lights");
+        let values: Vec<f64> = sphere(place)
+            .iter()
+            .map(|point| lights.irradiance(point).x / PI)
+            .collect();
+        let [least, most] = [
+            values.iter().copied().fold(f64::INFINITY, f64::min),
+            values.iter().copied().fold(0.0, f64::max),
+        ];
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        println!("{form:?}, {side}² texels a face, {place}: {mean:.4}, {least:.4} to {most:.4}");
+        [mean, least, most]
+    };
+    let near = |found: f64, published: f64, slack: f64| {
+        assert!((found - published).abs() <= slack, "{found}, published {published}")
+    };
+    for (side, published) in [(2, [0.955, 1.045]), (4, [0.988, 1.007]), (8, [0.996, 1.011])] {
+        let [_, least, most] = of(side, Disc, LitRoom::PLACES[0]);
+        near(least, published[0], 2e-3);
+        near(most, published[1], 2e-3);
+    }
+    let [mean, least, most] = of(4, Disc, LitRoom::PLACES[1]);
+    near(mean, 1.048, 5e-3);
+    near(least, 1.020, 5e-3);
+    near(most, 1.084, 5e-3);
+    // Without bound in the corner, and with the disc's.
+    let [mean, _, most] = of(4, Ratio, LitRoom::PLACES[3]);
+    near(mean, 1.82, 0.05);
+    near(most, 11.2, 0.2);
+    let [mean, _, most] = of(4, Disc, LitRoom::PLACES[3]);
+    near(mean, 1.00, 0.02);
+    near(most, 1.73, 0.02);
 }
 
 /// At the map's place a gather is the sum over texels by their own solid angles.
@@ -169,7 +234,7 @@ fn at_the_maps_place_it_is_the_convolved_map() {
                     11.0 / TAU * cosine.powi(10) * angle * light.radiance.x
                 })
                 .sum();
-            let found = lights.gather(&point, 10.0, Terms::All, None).x;
+            let found = lights.gather(&point, Lobe::Middles(10.0), Terms::All).x;
             assert!((found / convolved - 1.0).abs() < 1e-9, "{form:?}: {found} {convolved}");
         }
     }
@@ -214,6 +279,12 @@ fn bad_maps_and_settings_are_refused_by_name() {
     let wide = ImpostorImage::from_fn(map, size, 1, false, |d| BoxRoom::EMPTY.surfaces(d)).expect("impostor");
     let light = MapImage::from_fn(map, size, |_| DVec3::ONE).expect("radiance");
     refused(&light, &wide, 4, Disc, "no square layers");
+    // One light about the map's place.
+    for map in [Parametrization::OctahedronQuadratic, Parametrization::EqualArea] {
+        let (radiance, impostor) = LitRoom::EVEN.maps(map, 12).expect("maps");
+        refused(&radiance, &impostor, 1, Disc, "is one light about the place");
+        assert!(GatherLights::new(&radiance, &impostor, 2, Disc).is_ok(), "{map}");
+    }
     for exponent in [0.0, 0.5, 65.0, f64::NAN] {
         assert!(Reflectivity::new(exponent).is_err(), "{exponent}");
     }

@@ -79,9 +79,15 @@ fn zero_vectors_and_numbers_that_are_none_find_nothing() {
             ray([0.2, 0.0, 0.0], [0.0; 3]),
             ray([f64::NAN, 0.0, 0.0], [1.0, 0.0, 0.0]),
             ray([f64::INFINITY, 0.0, 0.0], [1.0, 0.0, 0.0]),
+            ray([1e200, 0.0, 0.0], [1.0, 0.0, 0.0]),
+            ray([0.0, -1e16, 0.0], [1.0, 0.0, 0.0]),
             ImpostorRay {
                 origin: DVec3::ZERO,
                 direction: DVec3::NAN,
+            },
+            ImpostorRay {
+                origin: DVec3::ZERO,
+                direction: 2.0 * DVec3::X,
             },
         ] {
             let hit = impostor_search(&scene, &bad, &settings(method));
@@ -138,6 +144,44 @@ fn a_march_finds_the_first_hit_where_brackets_find_a_later_one() {
             (hit.distance - later).abs() < 1e-6 && hit.residual < 1e-6,
             "{method}: {hit:?}"
         );
+    }
+}
+
+/// Every texel of the nearest or the farthest, and rays as far as there are, in f32 as the device has them.
+#[test]
+fn all_numbers_stay_finite() {
+    let least = ImpostorImage::LEAST;
+    for nearest in [least, 1.0, 0.9 * ImpostorImage::NOTHING] {
+        let distances: Vec<f32> = (0..24)
+            .map(|i| if i % 2 == 0 { nearest } else { 2.0 * nearest })
+            .collect();
+        let image = ImpostorImage::new(CUBE, UVec2::splat(2), 1, distances, None).expect("an impostor");
+        for method in SearchMethod::ALL {
+            for origin in [[9e15, -9e15, 0.0], [1e-30, 0.0, 0.0], [0.3, 0.2, -0.1]] {
+                let hit = image.search(&ray(origin, [-0.6, 0.64, 0.48]), &settings(method));
+                let numbers = [hit.distance, hit.residual, hit.direction.length()];
+                let is_finite = numbers.map(|x| x as f32).iter().all(|x| x.is_finite());
+                assert!(is_finite, "{method}, {nearest:e}, {origin:?}: {hit:?}");
+            }
+        }
+    }
+}
+
+/// Between the centres of coarse texels the walls are nearer than at any of them: by their planes, a march would begin behind them.
+#[test]
+fn a_march_begins_in_front_of_coarse_texels() {
+    for side in [2, 4] {
+        let image = ImpostorImage::from_fn(CUBE, UVec2::splat(side), 1, true, |d| BoxRoom::EMPTY.surfaces(d));
+        let image = image.expect("an impostor");
+        assert!(0.95 * image.extent()[0] > 1.0, "{:?}", image.extent());
+        for origin in [[0.0; 3], [0.1, 0.0, 0.0]] {
+            let hit = image.search(&ray(origin, [1.0, 0.0, 0.0]), &settings(SearchMethod::March));
+            let exact = 1.0 - origin[0];
+            assert!(
+                (hit.distance - exact).abs() < 1e-3 && hit.residual < 1e-3,
+                "{side}: {hit:?}"
+            );
+        }
     }
 }
 
@@ -259,7 +303,7 @@ fn bad_maps_and_settings_are_refused_by_name() {
     refused(CUBE, size, 9, vec![1.0; 9 * 24], None, "impostor layers");
     refused(CUBE, size, 1, vec![1.0; 23], None, "impostor distances");
     refused(CUBE, size, 1, good.clone(), Some(&[DVec3::X; 23]), "impostor normals");
-    for value in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+    for value in [0.0, -1.0, 1e-17, f32::NAN, f32::INFINITY] {
         refused(CUBE, size, 1, texel(5, value), None, "distance of texel 5");
     }
     let falling = texel(3, 2.0).into_iter().chain(good.clone()).collect();

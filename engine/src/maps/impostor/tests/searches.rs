@@ -47,7 +47,8 @@ fn texels_with_normals_give_what_exact_rooms_do() {
             for (method, steps, published) in PUBLISHED {
                 let settings = ImpostorSettings::of(method, steps);
                 let found = errors(sphere, &rays, |ray| room.search(ray, &settings)).mean();
-                near(&format!("{map} {} {method} +{steps}", sphere.name), found, published[i]);
+                let what = format!("{map} {} {method} +{steps}", sphere.name);
+                within(&what, found, published[i], OF_TEXELS);
             }
         }
     }
@@ -86,20 +87,21 @@ fn all_and_seen(sphere: &ShinySphere, settings: &ImpostorSettings, layers: u32) 
 
 #[test]
 fn hidden_surfaces_give_the_published_errors() {
-    let cases: [(&ShinySphere, SearchMethod, u32, [f64; 2]); 13] = [
+    let cases: [(&ShinySphere, SearchMethod, u32, [f64; 2]); 14] = [
         (&ShinySphere::BOX, Classical, 0, [21.1, 21.2]),
         (&ShinySphere::BOX, SecantFromGuess, 0, [1.95, 1.50]),
         (&ShinySphere::BOX, FalsePosition, 3, [0.39, 0.19]),
         (&ShinySphere::BOX, FalsePosition, 10, [0.23, 0.042]),
         (&ShinySphere::BOX, Mixed, 3, [0.40, 0.20]),
         (&ShinySphere::BOX, Mixed, 10, [0.33, 0.136]),
-        (&ShinySphere::BOX, March, 64, [0.21, 0.017]),
+        (&ShinySphere::BOX, SecantFromGuess, 10, [0.84, 0.65]),
         (&ShinySphere::P1, Classical, 0, [30.9, 23.8]),
         (&ShinySphere::P1, SecantFromGuess, 0, [15.9, 1.19]),
         (&ShinySphere::P1, FalsePosition, 3, [8.3, 0.52]),
         (&ShinySphere::P1, FalsePosition, 10, [7.9, 0.064]),
         (&ShinySphere::P1, Mixed, 3, [12.7, 0.35]),
         (&ShinySphere::P1, Mixed, 10, [11.9, 0.072]),
+        (&ShinySphere::P1, SecantFromGuess, 10, [15.6, 0.024]),
     ];
     for (sphere, method, steps, published) in cases {
         let [all, seen] = all_and_seen(sphere, &ImpostorSettings::of(method, steps), 1);
@@ -114,6 +116,38 @@ fn hidden_surfaces_give_the_published_errors() {
             published[1],
         );
     }
+}
+
+/// The published march takes the first crossing, be it a jump at a silhouette: here that of a tolerance close to 1. The engine's goes on to a surface, which
+/// where the first hit is hidden is another one: farther from the truth beside the pillar, nearer to it behind.
+#[test]
+fn the_first_crossing_errs_as_published() {
+    let first = ImpostorSettings {
+        tolerance: 0.999,
+        ..ImpostorSettings::of(March, 64)
+    };
+    for (sphere, published) in [(ShinySphere::BOX, [0.21, 0.017]), (ShinySphere::P1, [7.5, 0.003])] {
+        let [all, seen] = all_and_seen(&sphere, &first, 1);
+        near(
+            &format!("{}, first crossing, all", sphere.name),
+            all.mean(),
+            published[0],
+        );
+        // A few rays at silhouettes, and what the published four refinements leave.
+        let seen = seen.mean();
+        println!(
+            "{}, first crossing, seen: {seen:.4}, published {}",
+            sphere.name, published[1]
+        );
+        assert!(seen <= 1.2 * published[1], "{}: {seen}", sphere.name);
+    }
+    let [march, first] = [ImpostorSettings::of(March, 64), first]
+        .map(|settings| [ShinySphere::P1, ShinySphere::P2].map(|sphere| all_and_seen(&sphere, &settings, 1)[0].mean()));
+    println!("to a surface {march:?}, to the first crossing {first:?}");
+    assert!(
+        march[0] > 1.3 * first[0] && march[1] < 0.8 * first[1],
+        "{march:?} {first:?}"
+    );
 }
 
 /// A point that the map's place does not see is no bracket: false position fails there, the hybrid does not.
@@ -153,9 +187,8 @@ fn layers_hold_what_lies_behind() {
                 sphere.name,
                 all.good()
             );
-            let slack = if layers == 3 { 1.0 } else { 4.0 };
             assert!(
-                (all.good() - published).abs() < slack,
+                (all.good() - published).abs() < 1.0,
                 "{} {layers}: {}",
                 sphere.name,
                 all.good()
