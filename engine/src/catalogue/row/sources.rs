@@ -92,12 +92,14 @@ sources! {
     KHRONOS_VULKAN = "khronos-vulkan": "Khronos", "Vulkan 1.3 Specification", "", 0;
     KIRK_ARVO_1991 = "kirk-arvo-1991": "D. Kirk, J. Arvo", "Unbiased Sampling Techniques for Image Synthesis", "SIGGRAPH", 1991;
     KNAUS_ZWICKER_2011 = "knaus-zwicker-2011": "C. Knaus, M. Zwicker", "Progressive Photon Mapping: A Probabilistic Approach", "ACM TOG 30(3)", 2011;
+    KELLER_HEIDRICH_2001 = "keller-heidrich-2001": "A. Keller, W. Heidrich", "Interleaved Sampling", "EGWR", 2001;
     KOLLIG_KELLER_2006 = "kollig-keller-2006": "T. Kollig, A. Keller", "Illumination in the Presence of Weak Singularities", "Monte Carlo and Quasi-Monte Carlo Methods 2004", 2006;
     KULLA_CONTY_2017 = "kulla-conty-2017": "C. Kulla, A. Conty", "Revisiting Physically Based Shading at Imageworks", "SIGGRAPH course notes", 2017;
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;
     KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;
     LAFORTUNE_WILLEMS_1994 = "lafortune-willems-1994": "E. Lafortune, Y. Willems", "Using the Modified Phong Reflectance Model for Physically Based Rendering", "Report CW 197, KU Leuven", 1994;
     LAGARDE_ZANUTTINI_2012 = "lagarde-zanuttini-2012": "S. Lagarde, A. Zanuttini", "Local Image-based Lighting with Parallax-corrected Cubemaps", "SIGGRAPH Talks", 2012;
+    LAINE_2007 = "laine-2007": "S. Laine, H. Saransaari, J. Kontkanen, J. Lehtinen, T. Aila", "Incremental Instant Radiosity for Real-Time Indirect Illumination", "EGSR", 2007;
     LAINE_2010 = "laine-2010": "S. Laine", "Restart Trail for Stackless BVH Traversal", "HPG", 2010;
     LAINE_2013 = "laine-2013": "S. Laine, T. Karras, T. Aila", "Megakernels Considered Harmful: Wavefront Path Tracing on GPUs", "HPG", 2013;
     LAINE_KARRAS_2011 = "laine-karras-2011": "S. Laine, T. Karras", "Stratified Sampling for Stochastic Transparency", "EGSR", 2011;
@@ -129,6 +131,7 @@ sources! {
     SATISH_2009 = "satish-2009": "N. Satish, M. Harris, M. Garland", "Designing Efficient Sorting Algorithms for Manycore GPUs", "IPDPS", 2009;
     SCHJOTH_2007 = "schjoth-2007": "L. Schjøth, J. Frisvad, K. Erleben, J. Sporring", "Photon Differentials", "GRAPHITE", 2007;
     SCHLICK_1994 = "schlick-1994": "C. Schlick", "An Inexpensive BRDF Model for Physically-based Rendering", "Eurographics", 1994;
+    SEGOVIA_2006 = "segovia-2006": "B. Segovia, J.-C. Iehl, R. Mitanchey, B. Péroche", "Non-interleaved Deferred Shading of Interleaved Sample Patterns", "Graphics Hardware", 2006;
     SENGUPTA_2007 = "sengupta-2007": "S. Sengupta, M. Harris, Y. Zhang, J. Owens", "Scan Primitives for GPU Computing", "Graphics Hardware", 2007;
     SHIRLEY_1996 = "shirley-1996": "P. Shirley, C. Wang, K. Zimmerman", "Monte Carlo Techniques for Direct Lighting Calculations", "ACM TOG 15(1)", 1996;
     SHIRLEY_1997 = "shirley-1997": "P. Shirley et al.", "A Practitioners' Assessment of Light Reflection Models", "Pacific Graphics", 1997;

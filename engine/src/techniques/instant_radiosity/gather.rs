@@ -31,8 +31,16 @@ const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
 /// Connections of a submission that goes on with places that have stopped: a second or less on two cores.
 const SOFTWARE_CONNECTIONS: u64 = 1 << 19;
 const DEVICE_CONNECTIONS: u64 = 1 << 26;
+
+/// Connections that a submission may make on a device.
+pub(super) fn connections_at_once(gpu: &Gpu) -> u64 {
+    match gpu.caps().kind {
+        DeviceKind::Cpu => SOFTWARE_CONNECTIONS,
+        _ => DEVICE_CONNECTIONS,
+    }
+}
 /// Sweeps over the places that have stopped beyond those which the lights take, for each light: rays longer than that never end.
-const SWEEPS_A_LIGHT: u64 = 4096;
+pub(super) const SWEEPS_A_LIGHT: u64 = 4096;
 
 /// Exact counts of connections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -113,10 +121,7 @@ impl Gather {
             bounces: [settings.least_bounces, settings.most().unwrap_or(u32::MAX)],
             edge_bound,
             lights_at_once,
-            connections: match gpu.caps().kind {
-                DeviceKind::Cpu => SOFTWARE_CONNECTIONS,
-                _ => DEVICE_CONNECTIONS,
-            },
+            connections: connections_at_once(gpu),
         })
     }
 
@@ -140,7 +145,7 @@ impl Gather {
 }
 
 /// Lights that a place takes in a dispatch, and loop iterations after which a shadow ray goes on in the next: together they stay below what software drivers run.
-fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<(u32, u32)> {
+pub(super) fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<(u32, u32)> {
     let filters = scene.profile().has_alpha();
     let most = match gpu.caps().kind {
         DeviceKind::Cpu => SOFTWARE_LIGHTS,
@@ -291,6 +296,7 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         shaders: &[
             "shaders/techniques/instant_radiosity/vpl_gather.comp",
+            "shaders/techniques/instant_radiosity/connection.glsl",
             "shaders/transport/edge_bound.glsl",
         ],
         bias: Some(Bias::Biased("what a bound leaves out, unless it is compensated")),
