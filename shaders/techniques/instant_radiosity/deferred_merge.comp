@@ -2,8 +2,9 @@
 // The split picture's sums back at their pixels, as means over all lights, and filtered there: light of neighbours on the same surface, which other subsets of the
 // lights brought, is averaged; their colours are not.
 //
-// A neighbour counts where it lies in the pixel's tangent plane, as far as a threshold allows, and has its normal, as far as another does: on a flat surface the window
-// of n x n pixels has each subset once. The pixel itself always counts. What is averaged are differences, so that equal values stay as they are to the bit.
+// A neighbour counts where it lies in the pixel's tangent plane, as far as a threshold allows, and has its normal, as far as another does: on a flat surface the window,
+// n pixels wide with rims of half weight where n is even, has each subset once. The pixel itself always counts. What is averaged are differences, so that equal values
+// stay as they are to the bit.
 //
 // SVO-P13, SVO-P14: C. Sun, 2015, §4.11 and §4.12, after S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", 2007. Deterministic.
 #extension GL_GOOGLE_include_directive : require
@@ -40,8 +41,8 @@ layout(set = 0, binding = 2) uniform sampler2D seen_positions;  // w is 0 where 
 layout(set = 0, binding = 3) uniform usampler2D seen_normals;
 layout(set = 0, binding = 4, scalar) restrict buffer Radiance { vec3 radiance[]; };
 
-// What a pixel has of all lights, by its subset of them.
-vec3 merged(uvec2 pixel, uint place) {
+// What a place has of all lights, by its subset of them.
+vec3 merged(uint place) {
     uint tile = place / interleave_stride(uvec2(push.width, push.height), push.interleave);
     uvec2 of_subset = interleave_lights(tile % push.subsets, push.subsets, push.lights);
     return split_states[place].sum * (push.scale * (float(push.lights) / float(of_subset.y - of_subset.x)));
@@ -53,12 +54,15 @@ vec3 divisor(vec3 color) { return mix(vec3(1.0), color, greaterThan(color, vec3(
 // 1 for bands in which both colours are something, or both nothing: what one shows of the light there tells of the other.
 vec3 alike(vec3 a, vec3 b) { return vec3(equal(greaterThan(a, vec3(0.0)), greaterThan(b, vec3(0.0)))); }
 
+// Of a pixel that is so far from the middle of the window along an axis.
+float window_weight(int offset) { return 2 * abs(offset) == int(push.interleave) ? 0.5 : 1.0; }
+
 vec3 seen_normal(ivec2 pixel) { return unpack_octahedral(texelFetch(seen_normals, pixel, 0).y, SHADING_NORMAL_BITS); }
 
 vec3 filtered(uvec2 pixel) {
     uvec2 size = uvec2(push.width, push.height);
     uint place = interleave_split(pixel, size, push.interleave);
-    vec3 value = merged(pixel, place);
+    vec3 value = merged(place);
     vec4 position = texelFetch(seen_positions, ivec2(pixel), 0);
     if (position.w == 0.0) {
         return value;
@@ -68,18 +72,20 @@ vec3 filtered(uvec2 pixel) {
     vec3 middle = value / divisor(color);
     vec3 differences = vec3(0.0);
     vec3 count = vec3(1.0);
-    ivec2 first = ivec2(pixel) - int((push.interleave - 1u) / 2u);
-    for (uint i = 0u; i < push.interleave * push.interleave; ++i) {
-        ivec2 other = first + ivec2(i % push.interleave, i / push.interleave);
-        if (other == ivec2(pixel) || any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, ivec2(size)))) {
+    uint reach = push.interleave / 2u;
+    uint side = 2u * reach + 1u;
+    for (uint i = 0u; i < side * side; ++i) {
+        ivec2 offset = ivec2(i % side, i / side) - int(reach);
+        ivec2 other = ivec2(pixel) + offset;
+        if (offset == ivec2(0) || any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, ivec2(size)))) {
             continue;
         }
         vec4 there = texelFetch(seen_positions, other, 0);
         bool is_near = there.w != 0.0 && abs(dot(normal, there.xyz - position.xyz)) <= push.plane_max;
         if (is_near && dot(normal, seen_normal(other)) > push.normal_min) {
             uint neighbour = interleave_split(uvec2(other), size, push.interleave);
-            vec3 counts = alike(color, split_colors[neighbour]);
-            differences += counts * (merged(uvec2(other), neighbour) / divisor(split_colors[neighbour]) - middle);
+            vec3 counts = window_weight(offset.x) * window_weight(offset.y) * alike(color, split_colors[neighbour]);
+            differences += counts * (merged(neighbour) / divisor(split_colors[neighbour]) - middle);
             count += counts;
         }
     }
@@ -97,7 +103,7 @@ void main() {
     if (FILTERS) {
         light = filtered(pixel);
     } else {
-        light = merged(pixel, interleave_split(pixel, uvec2(push.width, push.height), push.interleave));
+        light = merged(interleave_split(pixel, uvec2(push.width, push.height), push.interleave));
     }
     radiance[i] = ADDS ? radiance[i] + light : light;
 }

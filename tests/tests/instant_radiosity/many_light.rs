@@ -137,8 +137,8 @@ fn terrace() -> Scene {
 #[test]
 fn frames_with_rays_are_the_path_tracers() {
     with_gpu(|gpu| {
-        for (scene, lights) in [(hall(), 64), (furnished(), 256)] {
-            let reference = render(gpu, &scene, SIZE, 4096, &paths(ALL));
+        for (scene, lights) in [(hall(), 64), (furnished(), 128)] {
+            let reference = render(gpu, &scene, SIZE, 2048, &paths(ALL));
             let settings = ManyLightSettings { lights, ..exact() };
             let mut renderer = frames(gpu, &scene, SIZE, &settings);
             let found = passes_of(&mut renderer, SIZE, 1, 64);
@@ -272,15 +272,13 @@ fn frames_do_not_depend_on_how_work_is_shared_out() {
             };
             let whole = all(&base);
             assert_eq!(whole.1.maps > 0, visibility == Visibility::Maps);
-            for (lights_at_once, maps_at_once, submission_work) in [(1, 1, 1), (3, 7, 0)] {
-                let parted = ManyLightSettings {
-                    lights_at_once,
-                    maps_at_once,
-                    submission_work,
-                    ..base.clone()
-                };
-                assert!(all(&parted) == whole, "{visibility:?} {lights_at_once} {maps_at_once}");
-            }
+            let parted = ManyLightSettings {
+                lights_at_once: 3,
+                maps_at_once: 7,
+                submission_work: 1,
+                ..base.clone()
+            };
+            assert!(all(&parted) == whole, "{visibility:?}");
             // Begun anew, and with another seed.
             let mut renderer = frames(gpu, &scene, [13, 7], &base);
             renderer.step(2).expect("a step");
@@ -333,13 +331,13 @@ fn what_is_not_needed_is_not_recorded() {
         assert_eq!(passes, 6 + 2 * maps);
         assert_eq!(kernels, [true, true, true, true]);
         assert!(bytes_of_maps > bytes);
-        // Positions and normals of 16 · 8 pixels, and colours of 16 tiles with 64 places each, of which one is there without a filter.
+        // Positions and normals of 16 · 8 pixels, and colours of 16 tiles with 64 places each; without a filter the least that a buffer has.
         let filtered = ManyLightSettings {
             filter: true,
             ..exact()
         };
         let (passes, _, _, bytes_of_filter) = once(&filtered);
-        assert_eq!((passes, bytes_of_filter - bytes), (6, 24 * 128 + 12 * (16 * 64 - 1)));
+        assert_eq!((passes, bytes_of_filter - bytes), (6, 24 * 128 + 12 * 16 * 64 - 16));
         // A picture without tiles has nothing to average.
         let one_tile = ManyLightSettings {
             interleave: 1,
@@ -564,13 +562,12 @@ fn what_frames_cannot_model_is_refused_by_name() {
 #[test]
 fn threads_and_widths_of_the_driver_never_show() {
     let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
-    let truth = hash(&[("LP_NUM_THREADS", "1")]);
+    let truth = hash(&[("LP_NUM_THREADS", "2")]);
     for variables in [
-        &[("LP_NUM_THREADS", "2")][..],
-        &[("LP_NATIVE_VECTOR_WIDTH", "128")],
-        &[("LP_NATIVE_VECTOR_WIDTH", "512")],
+        [("LP_NUM_THREADS", "1"), ("LP_NATIVE_VECTOR_WIDTH", "128")],
+        [("LP_NUM_THREADS", "2"), ("LP_NATIVE_VECTOR_WIDTH", "512")],
     ] {
-        assert_eq!(hash(variables), truth, "{variables:?}");
+        assert_eq!(hash(&variables), truth, "{variables:?}");
     }
 }
 

@@ -84,6 +84,7 @@ sources! {
     KAY_KAJIYA_1986 = "kay-kajiya-1986": "T. Kay, J. Kajiya", "Ray Tracing Complex Scenes", "SIGGRAPH", 1986;
     KELEMEN_SZIRMAY_KALOS_2001 = "kelemen-szirmay-kalos-2001": "C. Kelemen, L. Szirmay-Kalos", "A Microfacet Based Coupled Specular-Matte BRDF Model", "Eurographics short papers", 2001;
     KELLER_1997 = "keller-1997": "A. Keller", "Instant Radiosity", "SIGGRAPH", 1997;
+    KELLER_HEIDRICH_2001 = "keller-heidrich-2001": "A. Keller, W. Heidrich", "Interleaved Sampling", "EGWR", 2001;
     KHRONOS_GLTF = "khronos-gltf": "Khronos", "glTF 2.0 Specification", "", 0;
     KHRONOS_LIGHTS_PUNCTUAL = "khronos-lights-punctual": "Khronos", "KHR_lights_punctual", "glTF extension", 0;
     KHRONOS_MATERIALS_VOLUME = "khronos-materials-volume": "Khronos", "KHR_materials_volume", "glTF extension", 0;
@@ -92,7 +93,6 @@ sources! {
     KHRONOS_VULKAN = "khronos-vulkan": "Khronos", "Vulkan 1.3 Specification", "", 0;
     KIRK_ARVO_1991 = "kirk-arvo-1991": "D. Kirk, J. Arvo", "Unbiased Sampling Techniques for Image Synthesis", "SIGGRAPH", 1991;
     KNAUS_ZWICKER_2011 = "knaus-zwicker-2011": "C. Knaus, M. Zwicker", "Progressive Photon Mapping: A Probabilistic Approach", "ACM TOG 30(3)", 2011;
-    KELLER_HEIDRICH_2001 = "keller-heidrich-2001": "A. Keller, W. Heidrich", "Interleaved Sampling", "EGWR", 2001;
     KOLLIG_KELLER_2006 = "kollig-keller-2006": "T. Kollig, A. Keller", "Illumination in the Presence of Weak Singularities", "Monte Carlo and Quasi-Monte Carlo Methods 2004", 2006;
     KULLA_CONTY_2017 = "kulla-conty-2017": "C. Kulla, A. Conty", "Revisiting Physically Based Shading at Imageworks", "SIGGRAPH course notes", 2017;
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;

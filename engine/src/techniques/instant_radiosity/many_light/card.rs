@@ -213,7 +213,6 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light.rs::what_is_not_needed_is_not_recorded",
             "tests/tests/instant_radiosity/many_light.rs::scenes_without_lights_are_black_and_walks_that_leave_do_no_harm",
             "tests/tests/instant_radiosity/many_light.rs::what_frames_cannot_model_is_refused_by_name",
-            "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",
         ],
         api: &["clerestory::techniques::instant_radiosity::many_light::ManyLight"],
         settings: &[
@@ -293,7 +292,10 @@ const ROWS: &[Row] = &[
             "borders of shadows err by half a texel of a map, and small things as a whole",
         )),
         needs: &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"],
-        tests: &["tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays"],
+        tests: &[
+            "tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays",
+            "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",
+        ],
         settings: &["visibility", "map_side"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/maps.rs")
     },

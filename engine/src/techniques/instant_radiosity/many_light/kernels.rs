@@ -242,7 +242,7 @@ impl Split {
         adds: bool,
         maps: Option<&Maps>,
     ) -> Result<Self> {
-        let interleaving = Interleaving::new(size, settings.tiles());
+        let interleaving = Interleaving::new(size, settings.interleave);
         let places = interleaving.places();
         let places = u32::try_from(places).map_err(|_| Error::LimitExceeded {
             name: "places of a split picture".into(),
@@ -276,16 +276,16 @@ impl Split {
         let connections = connections_at_once(gpu);
         let at_once = (connections / u64::from(lights_at_once)).clamp(1, 1 << 30) as u32;
         let pixels = size[0] * size[1];
-        let window = u64::from(if filters {
-            settings.tiles() * settings.tiles()
+        let window = if filters {
+            u64::from(settings.interleave + 1).pow(2)
         } else {
             1
-        });
+        };
         let merges = Part::count(gpu, FILTER_WORK * window * u64::from(pixels));
         Ok(Self {
             interleaving,
             size,
-            tiles: settings.tiles(),
+            tiles: settings.interleave,
             subsets: settings.subsets(),
             split: gpu.compute_pipeline(&Default::default())?,
             gather: if settings.visibility == Visibility::Rays {

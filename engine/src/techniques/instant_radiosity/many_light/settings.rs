@@ -97,11 +97,6 @@ impl ManyLightSettings {
         self.path_set.min_bounces() <= bounces && self.path_set.max_bounces().is_none_or(|most| bounces <= most)
     }
 
-    /// Tiles along a side.
-    pub(super) fn tiles(&self) -> u32 {
-        self.interleave
-    }
-
     /// Parts that the lights fall in.
     pub(super) fn subsets(&self) -> u32 {
         if self.whole_sets {
