@@ -11,6 +11,7 @@ const bool SEPARABLE_MASKING = false;
 #include "accel/sphere.glsl"
 #include "accel/triangle.glsl"
 #include "film/two_float.glsl"
+#include "techniques/instant_radiosity/interleave.glsl"
 #include "transport/edge_bound.glsl"
 #include "transport/fresnel.glsl"
 #include "transport/ggx.glsl"
@@ -162,6 +163,19 @@ void main() {
             out1(i, geometry_term(edge.x, edge.y, edge.z));
             out1(8u + i, bounded_share(in_bits(24u), in1(25u), edge.x, edge.y, edge.z));
         }
+        break;
+    }
+    case 15u: {  // interleaved pixels and lights
+        uvec2 size = uvec2(in_bits(0u), in_bits(1u));
+        uint n = in_bits(2u);
+        uvec2 pixel;
+        out_bits(0u, interleave_merge(in_bits(3u), size, n, pixel) ? 1u : 0u);
+        out_bits(1u, pixel.x);
+        out_bits(2u, pixel.y);
+        out_bits(3u, interleave_split(uvec2(in_bits(4u), in_bits(5u)), size, n));
+        uvec2 lights = interleave_lights(in_bits(6u), n * n, in_bits(7u));
+        out_bits(4u, lights.x);
+        out_bits(5u, lights.y);
         break;
     }
     }

@@ -23,12 +23,12 @@ mod foresight;
 pub mod frame;
 mod skipped;
 
-/// Declares the modules of techniques, and [`ALL`] of their cards: each has a constant `CARD`.
+/// Declares the modules of techniques, and [`ALL`] of their cards: each has a constant `CARD`. A `+` stands before the card of a family's further method.
 macro_rules! methods {
-    ($($module:ident),* $(,)?) => {
+    ($($module:ident,)* $(+ $family:ident::$card:ident,)*) => {
         $(pub mod $module;)*
 
-        const ALL: &[Card] = &[$($module::CARD),*];
+        const ALL: &[Card] = &[$($module::CARD,)* $($family::$card,)*];
     };
 }
 
@@ -38,6 +38,7 @@ methods! {
     preview,
     ambient,
     instant_radiosity,
+    + instant_radiosity::MANY_LIGHT,
 }
 
 use std::collections::BTreeMap;

@@ -16,12 +16,8 @@ layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
 #include "walk/wave.glsl"
-#include "techniques/instant_radiosity/virtual_light.glsl"
-#include "transport/arrival.glsl"
-#include "transport/edge_bound.glsl"
 #include "transport/path_set.glsl"
 
-layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
 layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
 layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // of a place, in a dispatch
 
@@ -47,14 +43,10 @@ layout(push_constant, scalar) uniform Push {
 
 // descriptor set 3: VirtualLightSet
 
-// What a place has had of the lights, where it goes on.
-struct GatherState {
-    vec3 sum;
-    uint light;   // the next one
-    uint cursor;  // where its shadow ray goes on
-};
-
 layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
+
+#include "techniques/instant_radiosity/connection.glsl"
+
 layout(set = 3, binding = 1, scalar) restrict buffer VirtualLightStates { GatherState gather_states[]; };  // by place
 layout(set = 3, binding = 2, scalar) restrict buffer VirtualLightCounters {
     uint gathers;          // places that gathered
@@ -67,12 +59,8 @@ layout(set = 3, binding = 3, scalar) restrict readonly buffer LightDepartures { 
 // Stand in walk_resume for a place that goes on in a later dispatch, and for one that has no light to gather or is done.
 const uint GATHER_STOPPED = 0xFFFFFFFEu;
 const uint GATHER_DONE = 0xFFFFFFFCu;
-// The greatest finite number.
-const float FINITE_MAX = 3.402823e38;
 // Tells the candidates of these rays from those of the paths' own.
 const uint GATHER_SEED = 0x76706c73u;
-// Loop iterations that a connection without its ray counts as.
-const uint CONNECTION_ITERATIONS = 4u;
 
 #define COUNT_WIDE(COUNTER, AMOUNT) { \
     uint counted_amount = AMOUNT; \
@@ -80,15 +68,6 @@ const uint CONNECTION_ITERATIONS = 4u;
         atomicAdd(gather_counters.COUNTER[1], 1u); \
     } \
 }
-
-// Where the path of an invocation has arrived.
-struct Receiver {
-    Arrival arrival;
-    ScatteringFrame frame;
-    uint interior;    // body that the way there was in
-    uint bounce;      // scatterings between the point and the eye
-    vec3 throughput;  // from the point on
-};
 
 uint arriving_bounce(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
 uint arriving_state(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }
@@ -118,63 +97,8 @@ bool begin_receiver(uint slot, uint place, out Receiver r) {
     return r.throughput != vec3(0.0);
 }
 
-// Radiant intensity over power, with the cosine, that a virtual light sends along `out_direction`, 1/sr: from the radiance that an eye path would find
-// there, whose shading normal faces that direction, so that virtual lights and eye paths have the same light of a surface.
-vec3 light_scattering(VirtualLight light, vec3 out_direction) {
-    if (LAMBERT) {
-        return light.surface * (INV_PI * max(dot(light.normal, out_direction), 0.0));
-    }
-    Arrival a = arrival_at(Hit(0.0, light.surface.xy, light.triangle), -out_direction, push.scene_lower, push.scene_upper);
-    ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
-    vec3 in_direction = -light.direction;
-    float cos_in = abs(dot(in_direction, a.surface.geometric_normal));
-    if (!sides_agree(frame.z, frame.outward, in_direction) || !(cos_in > 0.0)) {
-        return vec3(0.0);
-    }
-    // Radiance over irradiance times the cosine out; the scattering function has the shading normal's cosine in, the irradiance the surface's own.
-    float cos_out = abs(dot(out_direction, a.surface.geometric_normal));
-    return bsdf_eval(a.bsdf, frame.wo, world_to_frame(frame, in_direction), LOBE_ALL) * (cos_out / cos_in);
-}
-
-// Radiance that the receiver scatters of a virtual light's, if nothing stands between, and the ray that tells.
-vec3 connection(Receiver r, VirtualLight light, out Ray ray) {
-    Surface s = r.arrival.surface;
-    vec3 way = light.position - s.point.position;
-    float squared = dot(way, way);
-    vec3 wi = way * inversesqrt(squared);
-    ray = Ray(vec3(0.0), 0.0, vec3(0.0), 1.0);
-    uint bounces = r.bounce + light.bounce + 2u;
-    bool counts = !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces);
-    // A light at the point itself is on its own surface, or its distance is lost to rounding.
-    if (!counts || !(squared > 0.0) || !sides_agree(r.frame.z, r.frame.outward, wi)) {
-        return vec3(0.0);
-    }
-    vec3 found = light_scattering(light, -wi);
-    if (found == vec3(0.0)) {
-        return vec3(0.0);
-    }
-    found *= bsdf_eval(r.arrival.bsdf, r.frame.wo, world_to_frame(r.frame, wi), LOBE_ALL) * light.power / squared;
-    if (EDGE_BOUND != EDGE_UNBOUNDED) {
-        float cos_here = abs(dot(wi, s.geometric_normal));
-        float cos_there = abs(dot(wi, light.normal));
-        found *= bounded_share(EDGE_BOUND, push.edge_bound, cos_here, cos_there, squared);
-    }
-    if (HAS_ABSORPTION) {
-        uint passed = r.arrival.solid ? (dot(wi, r.frame.outward) < 0.0 ? s.material : OUTSIDE) : r.interior;
-        found = absorbed(found, passed, sqrt(squared));
-    }
-    ray.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
-    vec3 end = light.position + light.normal * (dot(light.normal, wi) > 0.0 ? -light.offset : light.offset);
-    ray.direction = end - ray.origin;
-    // What overflows is closer than numbers can tell.
-    return all(lessThanEqual(found, vec3(FINITE_MAX))) ? found : vec3(0.0);
-}
-
-VirtualLight load_virtual_light(uint index) {
-    int first = int(VIRTUAL_LIGHT_QUARTERS * index);
-    return unpack_virtual_light(texelFetch(virtual_light_texels, first), texelFetch(virtual_light_texels, first + 1),
-                                texelFetch(virtual_light_texels, first + 2), texelFetch(virtual_light_texels, first + 3));
-}
+// Whether the picture has what is scattered so often between a light source and the eye.
+bool counts_bounces(uint bounces) { return !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces); }
 
 // Goes on with the lights of a place.
 void gather(Receiver r, inout GatherState at, out uint rays) {
@@ -183,8 +107,9 @@ void gather(Receiver r, inout GatherState at, out uint rays) {
     bool stopped = false;
     do {
         Ray ray;
-        vec3 found = connection(r, load_virtual_light(at.light), ray);
-        if (found != vec3(0.0)) {
+        VirtualLight light = load_virtual_light(at.light);
+        vec3 found = connection(r, light, ray);
+        if (found != vec3(0.0) && counts_bounces(r.bounce + light.bounce + 2u)) {
             rays += at.cursor == INDEX_START ? 1u : 0u;
             if (HAS_ALPHA) {
                 // The point and the way to it stand for the path, of which a stage between knows no number: under an orthographic camera ways are equal.

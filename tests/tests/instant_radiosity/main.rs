@@ -7,6 +7,7 @@
 mod agreement;
 mod bounds;
 mod edge_cases;
+mod many_light;
 mod scattering;
 mod walks;
 
@@ -15,6 +16,7 @@ use std::f64::consts::PI;
 use clerestory::film::z_test::{SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
 use clerestory::scene::{LightKind, Material, Scene};
+use clerestory::techniques::Technique;
 use clerestory::techniques::instant_radiosity::{Bound, Compensation, PassCounts, VirtualLightSettings, VirtualLights};
 use clerestory::transport::random::SamplerKind;
 use clerestory_tests::render::{Rendered, builtin, cuboid, paths, render, upload};
@@ -45,7 +47,7 @@ fn renderer(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &VirtualLightSet
 }
 
 /// Goes on to that many samples per pixel, and reads radiance and variance.
-fn advance(renderer: &mut VirtualLights, samples: u32) -> [Vec<f32>; 2] {
+fn advance(renderer: &mut impl Technique, samples: u32) -> [Vec<f32>; 2] {
     while renderer
         .step(samples)
         .unwrap_or_else(|error| panic!("{error}"))
@@ -85,12 +87,21 @@ fn passes(gpu: &Gpu, scene: &Scene, settings: &VirtualLightSettings, count: u32)
 
 fn passes_of_size(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &VirtualLightSettings, count: u32) -> Passes {
     let mut renderer = renderer(gpu, scene, size, settings);
+    let found = passes_of(&mut renderer, size, settings.samples_per_pass, count);
+    Passes {
+        counts: renderer.counts(),
+        ..found
+    }
+}
+
+/// Of passes that have `each` samples of every pixel.
+fn passes_of(renderer: &mut impl Technique, size: [u32; 2], each: u32, count: u32) -> Passes {
     let n = f64::from(count);
     let values = 3 * (size[0] * size[1]) as usize;
     let (mut before, mut squares) = (vec![0.0; values], vec![0.0; values]);
     let mut means = [const { Vec::new() }; 3];
     for pass in 1..=count {
-        let [now, _] = advance(&mut renderer, pass * settings.samples_per_pass);
+        let [now, _] = advance(renderer, pass * each);
         let mut of_pass = vec![0.0f32; values];
         for i in 0..values {
             let sum = f64::from(now[i]) * f64::from(pass);
@@ -108,7 +119,7 @@ fn passes_of_size(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &VirtualLi
         radiance: before.iter().map(|sum| (sum / n) as f32).collect(),
         variance: before.iter().zip(&squares).map(variance).collect(),
         means,
-        counts: renderer.counts(),
+        counts: PassCounts::default(),
     }
 }
 

@@ -8,6 +8,7 @@ mod edges;
 mod fresnel_forms;
 mod geometry;
 mod impostors;
+mod interleave;
 mod light_tree;
 mod lights;
 mod maps;

@@ -84,6 +84,7 @@ sources! {
     KAY_KAJIYA_1986 = "kay-kajiya-1986": "T. Kay, J. Kajiya", "Ray Tracing Complex Scenes", "SIGGRAPH", 1986;
     KELEMEN_SZIRMAY_KALOS_2001 = "kelemen-szirmay-kalos-2001": "C. Kelemen, L. Szirmay-Kalos", "A Microfacet Based Coupled Specular-Matte BRDF Model", "Eurographics short papers", 2001;
     KELLER_1997 = "keller-1997": "A. Keller", "Instant Radiosity", "SIGGRAPH", 1997;
+    KELLER_HEIDRICH_2001 = "keller-heidrich-2001": "A. Keller, W. Heidrich", "Interleaved Sampling", "EGWR", 2001;
     KHRONOS_GLTF = "khronos-gltf": "Khronos", "glTF 2.0 Specification", "", 0;
     KHRONOS_LIGHTS_PUNCTUAL = "khronos-lights-punctual": "Khronos", "KHR_lights_punctual", "glTF extension", 0;
     KHRONOS_MATERIALS_VOLUME = "khronos-materials-volume": "Khronos", "KHR_materials_volume", "glTF extension", 0;
@@ -98,6 +99,7 @@ sources! {
     KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;
     LAFORTUNE_WILLEMS_1994 = "lafortune-willems-1994": "E. Lafortune, Y. Willems", "Using the Modified Phong Reflectance Model for Physically Based Rendering", "Report CW 197, KU Leuven", 1994;
     LAGARDE_ZANUTTINI_2012 = "lagarde-zanuttini-2012": "S. Lagarde, A. Zanuttini", "Local Image-based Lighting with Parallax-corrected Cubemaps", "SIGGRAPH Talks", 2012;
+    LAINE_2007 = "laine-2007": "S. Laine, H. Saransaari, J. Kontkanen, J. Lehtinen, T. Aila", "Incremental Instant Radiosity for Real-Time Indirect Illumination", "EGSR", 2007;
     LAINE_2010 = "laine-2010": "S. Laine", "Restart Trail for Stackless BVH Traversal", "HPG", 2010;
     LAINE_2013 = "laine-2013": "S. Laine, T. Karras, T. Aila", "Megakernels Considered Harmful: Wavefront Path Tracing on GPUs", "HPG", 2013;
     LAINE_KARRAS_2011 = "laine-karras-2011": "S. Laine, T. Karras", "Stratified Sampling for Stochastic Transparency", "EGSR", 2011;
@@ -129,6 +131,7 @@ sources! {
     SATISH_2009 = "satish-2009": "N. Satish, M. Harris, M. Garland", "Designing Efficient Sorting Algorithms for Manycore GPUs", "IPDPS", 2009;
     SCHJOTH_2007 = "schjoth-2007": "L. Schjøth, J. Frisvad, K. Erleben, J. Sporring", "Photon Differentials", "GRAPHITE", 2007;
     SCHLICK_1994 = "schlick-1994": "C. Schlick", "An Inexpensive BRDF Model for Physically-based Rendering", "Eurographics", 1994;
+    SEGOVIA_2006 = "segovia-2006": "B. Segovia, J.-C. Iehl, R. Mitanchey, B. Péroche", "Non-interleaved Deferred Shading of Interleaved Sample Patterns", "Graphics Hardware", 2006;
     SENGUPTA_2007 = "sengupta-2007": "S. Sengupta, M. Harris, Y. Zhang, J. Owens", "Scan Primitives for GPU Computing", "Graphics Hardware", 2007;
     SHIRLEY_1996 = "shirley-1996": "P. Shirley, C. Wang, K. Zimmerman", "Monte Carlo Techniques for Direct Lighting Calculations", "ACM TOG 15(1)", 1996;
     SHIRLEY_1997 = "shirley-1997": "P. Shirley et al.", "A Practitioners' Assessment of Light Reflection Models", "Pacific Graphics", 1997;

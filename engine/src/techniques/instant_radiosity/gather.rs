@@ -33,8 +33,19 @@ const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
 const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
 /// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections.
 const PLACES_AT_ONCE: u32 = 1 << 12;
+/// The same of techniques without a pace, on devices that a driver watches.
+const DEVICE_CONNECTIONS: u32 = 1 << 22;
+
+/// Connections that a submission may make on a device.
+pub(super) fn connections_at_once(gpu: &Gpu) -> u32 {
+    match gpu.caps().kind {
+        DeviceKind::Cpu => SOFTWARE_CONNECTIONS,
+        _ => DEVICE_CONNECTIONS,
+    }
+}
+
 /// Sweeps over the places that have stopped beyond those which the lights take, for each light: rays longer than that never end.
-const SWEEPS_A_LIGHT: u64 = 4096;
+pub(super) const SWEEPS_A_LIGHT: u64 = 4096;
 
 /// Exact counts of connections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -176,7 +187,7 @@ impl Gather {
 }
 
 /// Lights that a place takes in a dispatch, and loop iterations after which a shadow ray goes on in the next: together they stay below what software drivers run.
-fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<(u32, u32)> {
+pub(super) fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<(u32, u32)> {
     let filters = scene.profile().has_alpha();
     let mut lights = if wanted == 0 {
         LIGHTS_A_DISPATCH
@@ -322,6 +333,7 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         shaders: &[
             "shaders/techniques/instant_radiosity/vpl_gather.comp",
+            "shaders/techniques/instant_radiosity/connection.glsl",
             "shaders/transport/edge_bound.glsl",
         ],
         bias: Some(Bias::Biased("what a bound leaves out, unless it is compensated")),

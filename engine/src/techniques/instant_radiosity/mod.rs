@@ -3,10 +3,12 @@
 mod append;
 mod card;
 mod gather;
+pub mod many_light;
 mod renderer;
 mod settings;
 
 pub(super) use card::CARD;
 pub use gather::VirtualLightCounts;
+pub(super) use many_light::CARD as MANY_LIGHT;
 pub use renderer::{PassCounts, VirtualLight, VirtualLights};
 pub use settings::{Bound, Compensation, VirtualLightSettings};

@@ -25,6 +25,24 @@ pub enum Bound {
     Distance,
 }
 
+impl Bound {
+    /// With that value, or for 0 the square of the distance of neighbouring walks, or one over it, if so many ended evenly spread over an area, m².
+    pub(super) fn of_lights(self, value: f32, area: f64, walks: u32) -> EdgeBound {
+        let apart = area / f64::from(walks);
+        // A scene without surfaces has no edges.
+        let apart = if apart > 0.0 { apart } else { 1.0 };
+        let or = |automatic: f64| match f64::from(value) {
+            0.0 => automatic,
+            set => set,
+        };
+        match self {
+            Self::None => EdgeBound::Unbounded,
+            Self::Geometry => EdgeBound::Geometry(or(1.0 / apart)),
+            Self::Distance => EdgeBound::Distance(or(apart)),
+        }
+    }
+}
+
 /// What brings the light that a bound leaves out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -103,18 +121,7 @@ impl VirtualLightSettings {
 
     /// The bound, for surfaces of that area, m².
     pub(super) fn edge_bound(&self, area: f64) -> EdgeBound {
-        let apart = area / f64::from(self.walks);
-        // A scene without surfaces has no edges.
-        let apart = if apart > 0.0 { apart } else { 1.0 };
-        let or = |automatic: f64| match f64::from(self.bound_value) {
-            0.0 => automatic,
-            set => set,
-        };
-        match self.bound {
-            Bound::None => EdgeBound::Unbounded,
-            Bound::Geometry => EdgeBound::Geometry(or(1.0 / apart)),
-            Bound::Distance => EdgeBound::Distance(or(apart)),
-        }
+        self.bound.of_lights(self.bound_value, area, self.walks)
     }
 
     /// Whether eye paths bring what a bound leaves out.

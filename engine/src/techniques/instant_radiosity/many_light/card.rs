@@ -1,0 +1,317 @@
+//! Frames of many lights as a technique.
+
+use std::collections::BTreeMap;
+
+use super::{ManyLight, ManyLightSettings, Visibility};
+use crate::Result;
+use crate::catalogue::{Role, Row, sources};
+use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::raster::{surface_frag, surface_vert};
+use crate::gpu::shaders::techniques::instant_radiosity::{
+    deferred_direct, deferred_gather, deferred_merge, deferred_split, vpl_append,
+};
+use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
+use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend};
+use crate::gpu::{Buffer, PipelineInfo};
+use crate::scene::{Camera, SceneProfile};
+use crate::settings::{Settings, SettingsDecl, TypedSettings};
+use crate::techniques::skipped::skipped;
+use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
+use crate::transport::{PathSet, SURFACE_FEATURES};
+
+/// The causes, as the module's documentation has them.
+const BIAS: Bias = Bias::Biased(
+    "what the bound of the geometry term leaves out is not compensated; the filter averages the light of neighbouring pixels on a surface; \
+     visibility by maps errs at borders of shadows by their texels, and without any light goes through everything",
+);
+
+const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT"];
+
+/// What a picture may take with default settings, of whatever scene.
+const KERNELS: [&ShaderInfo; 13] = [
+    &photon_emit::INFO,
+    &photon_scatter::INFO,
+    &vpl_append::INFO,
+    &extend::INFO,
+    &compact_count::INFO,
+    &compact_scan::INFO,
+    &compact_scatter::INFO,
+    &surface_vert::INFO,
+    &surface_frag::INFO,
+    &deferred_direct::INFO,
+    &deferred_split::INFO,
+    &deferred_gather::INFO,
+    &deferred_merge::INFO,
+];
+
+/// The catalogue's entry.
+pub(in crate::techniques) const CARD: Card = Card {
+    id: "many-light",
+    summary: "many lights on a deferred frame: direct light and one reflection more, of virtual lights that are shared out among interleaved tiles, with shadow rays, shadow maps or neither",
+    rows: &[ROWS],
+    bias: BIAS,
+    needs: NEEDS,
+    kernels: &[&KERNELS],
+    path_set: PathSet::UP_TO_TWO_ROUGH,
+    refusals,
+    settings: SettingsDecl::of::<ManyLightSettings>(),
+    variants: &[Variant::DEFAULTS],
+    foresight: Foresight {
+        law,
+        ..Foresight::FRAMES
+    },
+    create: |gpu, scene, view, settings| {
+        let mut settings: ManyLightSettings = settings.read()?;
+        settings.seed = view.seed;
+        let technique = ManyLight::new(gpu, scene, view.camera, view.size, settings)?;
+        Ok(Box::new(technique))
+    },
+};
+
+/// Frames are independent, and pixels of a tile have the lights of one.
+fn law(_: &Settings) -> Result<Law> {
+    Ok(Law {
+        shares_noise: true,
+        ..Law::INDEPENDENT
+    })
+}
+
+/// Why a scene cannot be modelled.
+pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
+    reasons(&[
+        (
+            profile.media.any(),
+            "the scene has participating media, and virtual lights lie on surfaces only",
+        ),
+        (
+            profile.has_unlit,
+            "unlit surfaces send light that no walk from the lights brings",
+        ),
+        (profile.alpha.blend, "partial alpha is drawn opaque"),
+        (
+            profile.keeps_instances,
+            "it draws triangle by triangle, and the scene keeps its instances; with another ray index, such as `wide`, they are flattened",
+        ),
+    ])
+}
+
+impl Technique for ManyLight {
+    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        ManyLight::step(self, samples)
+    }
+
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        ManyLight::picture(self)
+    }
+
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        ManyLight::display(self, target, exposure, format)
+    }
+
+    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        ManyLight::set_camera(self, camera)
+    }
+
+    fn path_set(&self) -> PathSet {
+        ManyLight::path_set(self)
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        ManyLight::settings(self).to_json()
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        let c = self.counts();
+        BTreeMap::from([
+            ("frames", c.frames),
+            ("walks", c.walks.emitted),
+            ("walk_rays", c.walks.rays),
+            ("walks_escaped", c.walks.escaped),
+            ("walks_absorbed", c.walks.absorbed),
+            ("virtual_lights", c.lights),
+            ("connections", c.connections),
+            ("visibility_tests", c.visibility_tests),
+            ("shadow_maps", c.maps),
+            ("passes", c.passes),
+            ("bytes_between_passes", self.bytes()),
+        ])
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        ManyLight::pipelines(self)
+    }
+
+    fn skipped(&self) -> Vec<Skipped> {
+        let (pipelines, settings) = (ManyLight::pipelines(self), ManyLight::settings(self));
+        let shader = match self.has_direct_light() {
+            true => deferred_direct::INFO.name,
+            false => deferred_gather::INFO.name,
+        };
+        let mut all = skipped(&pipelines, shader, &SURFACE_FEATURES);
+        let lights = self.has_virtual_lights();
+        let further = [
+            (
+                !self.has_direct_light(),
+                "direct light",
+                "nothing sends any, or the picture has none of it",
+            ),
+            (
+                !lights,
+                "virtual lights",
+                "no light can be chosen, or the picture has nothing of theirs",
+            ),
+            (
+                lights && settings.visibility != Visibility::Maps,
+                "shadow maps of virtual lights",
+                "they were not asked for",
+            ),
+            (
+                lights && !settings.filters(),
+                "filter of neighbouring pixels",
+                "it was not asked for, or all pixels have all lights",
+            ),
+            (true, "albedo, normal and depth", "frames hold only radiance"),
+        ];
+        let missing = further.into_iter().filter(|(is_missing, ..)| *is_missing);
+        all.extend(missing.map(|(_, what, why)| Skipped { what, why }));
+        all
+    }
+}
+
+/// [`PathSet::UP_TO_TWO_ROUGH`] as path sets are written.
+const DISPLAYED: &str = "bounces=0..2,lobes=diffuse+glossy+reflection+transmission";
+
+/// Rows of the catalogue.
+const ROWS: &[Row] = &[
+    Row {
+        id: "SVO-P12",
+        name: "technique `many-light`: deferred frames of direct light and of one reflection more by virtual lights, new for each frame",
+        role: Role::Technique,
+        limits: "One indirect bounce, by lobes other than mirrors; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated.",
+        sources: &[
+            sources::KELLER_1997.whole(),
+            sources::SAITO_TAKAHASHI_1990.whole(),
+            sources::SUN_2015.at("§3.3 and §4.10"),
+        ],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/",
+            "shaders/techniques/photon_mapping/photon_emit.comp",
+            "shaders/techniques/photon_mapping/photon_scatter.comp",
+            "shaders/walk/",
+            "shaders/raster/surface.vert",
+            "shaders/raster/surface.frag",
+        ],
+        path_set: Some(DISPLAYED),
+        bias: Some(BIAS),
+        needs: NEEDS,
+        tests: &[
+            "tests/tests/instant_radiosity/many_light.rs::frames_with_rays_are_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light.rs::twice_the_lights_are_as_bright",
+            "tests/tests/instant_radiosity/many_light.rs::frames_do_not_depend_on_how_work_is_shared_out",
+            "tests/tests/instant_radiosity/many_light.rs::what_is_not_needed_is_not_recorded",
+            "tests/tests/instant_radiosity/many_light.rs::scenes_without_lights_are_black_and_walks_that_leave_do_no_harm",
+            "tests/tests/instant_radiosity/many_light.rs::what_frames_cannot_model_is_refused_by_name",
+        ],
+        api: &["clerestory::techniques::instant_radiosity::many_light::ManyLight"],
+        settings: &[
+            "clerestory::techniques::instant_radiosity::many_light::ManyLightSettings",
+            "clerestory render --technique many-light",
+        ],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/renderer.rs")
+    },
+    Row {
+        id: "SVO-P10",
+        name: "direct light of a deferred frame: a sample of the lights and one of the scattering function at each pixel, weighted against each other",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Rays, not shadow maps; lights are chosen by power alone, whatever they light.",
+        sources: &[sources::VEACH_1997.at("9.2"), sources::SUN_2015.at("§4.9")],
+        shaders: &["shaders/techniques/instant_radiosity/deferred_direct.comp"],
+        bias: Some(Bias::Unbiased),
+        tests: &["tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers"],
+        settings: &["path_set"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/kernels.rs")
+    },
+    Row {
+        id: "SVO-P7",
+        name: "interleaved sampling: G-buffers split into tiles that share a part of the lights, and merged again (SVO-P13)",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Each pixel has one of n² parts of the lights, which shows as a pattern where no filter follows.",
+        sources: &[
+            sources::KELLER_HEIDRICH_2001.whole(),
+            sources::SEGOVIA_2006.whole(),
+            sources::SUN_2015.at("§3.3, §4.6 and §4.11"),
+        ],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/deferred_split.comp",
+            "shaders/techniques/instant_radiosity/interleave.glsl",
+        ],
+        tests: &[
+            "engine/src/techniques/instant_radiosity/many_light/interleave.rs::merging_what_was_split_is_exact",
+            "engine/src/techniques/instant_radiosity/many_light/interleave.rs::windows_have_every_tile_once_and_workgroups_have_one_tile",
+            "engine/src/techniques/instant_radiosity/many_light/interleave.rs::parts_have_every_light_once",
+            "tests/tests/twins/interleave.rs::interleaved_pixels_agree_with_their_twins",
+            "tests/tests/instant_radiosity/many_light.rs::tiles_that_have_all_lights_give_the_same_bits",
+            "tests/tests/instant_radiosity/many_light.rs::parts_of_the_lights_bring_as_much_as_all",
+        ],
+        settings: &["interleave"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/interleave.rs")
+    },
+    Row {
+        id: "SVO-P14",
+        name: "filter of interleaved light over neighbours in the same plane with the same normal",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Blurs contact shadows, and highlights of glossy surfaces, by as many pixels as there are tiles along a side; single pixels without neighbours keep their pattern.",
+        sources: &[sources::LAINE_2007.whole(), sources::SUN_2015.at("§4.12")],
+        shaders: &["shaders/techniques/instant_radiosity/deferred_merge.comp"],
+        bias: Some(Bias::Biased(
+            "the light of neighbouring pixels on a surface is averaged",
+        )),
+        tests: &[
+            "tests/tests/instant_radiosity/many_light.rs::filters_average_what_lies_in_one_plane_alone",
+            "tests/tests/instant_radiosity/many_light.rs::filtered_tiles_are_nearly_what_all_lights_bring",
+        ],
+        settings: &["filter", "filter_plane", "filter_normal"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/kernels.rs")
+    },
+    Row {
+        id: "SVO-B0",
+        name: "shadow maps of virtual lights, exact ones of all triangles",
+        role: Role::PartOf("SVO-P12"),
+        limits: "An octahedron of all directions for each light, of which its surface hides one half; costs as lights times triangles.",
+        sources: &[
+            sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+            sources::SUN_2015.at("§1 and §6"),
+        ],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/deferred_gather.comp",
+            "shaders/raster/omni_shadow_set.glsl",
+        ],
+        bias: Some(Bias::Biased(
+            "borders of shadows err by half a texel of a map, and small things as a whole",
+        )),
+        needs: &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"],
+        tests: &[
+            "tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays",
+            "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",
+        ],
+        settings: &["visibility", "map_side"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/maps.rs")
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_path_set_is_that_of_its_expression() {
+        assert_eq!(CARD.path_set, DISPLAYED.parse().expect("path set"));
+        assert_eq!(
+            CARD.path_set,
+            "bounces=0..2,lobes=diffuse+glossy".parse().expect("path set")
+        );
+        assert_eq!(CARD.path_set.to_string(), DISPLAYED);
+    }
+}

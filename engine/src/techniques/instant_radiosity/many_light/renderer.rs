@@ -1,0 +1,289 @@
+//! A rendering of one view by frames of many lights.
+
+use std::sync::Arc;
+
+use super::card::refusals;
+use super::frame::Frame;
+use super::kernels::{Direct, Seen, Split};
+use super::maps::Maps;
+use super::settings::{ManyLightSettings, Visibility};
+use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{GpuFilm, PixelFormat, Step};
+use crate::gpu::{Buffer, BufferDesc, Category, Gpu, PipelineInfo};
+use crate::raster::{Coverage, DrawPart};
+use crate::scene::camera_frame::CameraFrame;
+use crate::scene::{Camera, SceneProfile};
+use crate::settings::TypedSettings;
+use crate::techniques::FrameTarget;
+use crate::techniques::foresight::frame_fits;
+use crate::techniques::instant_radiosity::append::LightAppend;
+use crate::techniques::photon_mapping::{PhotonCounts, PhotonPlan, PhotonTracer, Stored};
+use crate::transport::{GpuScene, PathSet};
+use crate::{Error, Result};
+
+/// Scatterings of the light that virtual lights bring.
+const CONNECTED: u32 = 2;
+
+/// Exact counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
+pub struct ManyLightCounts {
+    /// Frames, each a sample of every pixel.
+    pub frames: u64,
+    /// Walks from the lights.
+    pub walks: PhotonCounts,
+    /// Virtual lights of all frames.
+    pub lights: u64,
+    /// Pairs of a pixel and a virtual light.
+    pub connections: u64,
+    /// Pairs whose visibility was asked for: the others bring nothing, whatever stands between.
+    pub visibility_tests: u64,
+    /// Shadow maps that were drawn.
+    pub maps: u64,
+    /// Passes that were recorded, without those of walks.
+    pub passes: u64,
+}
+
+/// A rendering of one view by frames of many lights.
+pub struct ManyLight {
+    pub(super) gpu: Gpu,
+    pub(super) scene: Arc<GpuScene>,
+    pub(super) settings: ManyLightSettings,
+    pub(super) camera: Camera,
+    pub(super) film: GpuFilm,
+    pub(super) radiance: Buffer,
+    /// None where nothing of surfaces is shown.
+    pub(super) seen: Option<Seen>,
+    pub(super) coverage: Coverage,
+    /// Parts that what the camera sees is drawn in, once they are known.
+    pub(super) parts: Option<Vec<DrawPart>>,
+    pub(super) direct: Option<Direct>,
+    pub(super) indirect: Option<Indirect>,
+    pub(super) frame: Option<Frame>,
+    /// Frames on the film.
+    pub(super) done: u32,
+    pub(super) counts: ManyLightCounts,
+}
+
+/// Light of virtual lights.
+pub(super) struct Indirect {
+    pub(super) tracer: PhotonTracer,
+    pub(super) split: Split,
+    pub(super) maps: Option<Maps>,
+}
+
+impl ManyLight {
+    /// Prepares a rendering of `size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a setting, camera or size out of range, [`Error::Unsupported`] for a scene that it cannot model, with every reason,
+    /// [`Error::LimitExceeded`] for a picture or shadow maps larger than a buffer of the device or a ray index whose leaves are too long for a software device,
+    /// [`Error::MissingFeature`] for shadow maps where the device has no clip distances, [`Error::OutOfMemory`].
+    pub fn new(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: ManyLightSettings,
+    ) -> Result<Self> {
+        settings.check()?;
+        let reasons = refusals(scene.profile());
+        if !reasons.is_empty() {
+            return Err(Error::Unsupported {
+                technique: "many-light".into(),
+                reasons,
+            });
+        }
+        let film = GpuFilm::new(gpu, size, false)?;
+        CameraFrame::new(camera, size)?;
+        frame_fits(gpu.caps(), size)?;
+        let profile = scene.profile();
+        let emits = profile.has_environment() || scene.has_area_lights();
+        let shows_direct = (settings.shows(0) && emits) || (settings.shows(1) && scene.has_lights());
+        let shows_indirect = settings.shows(CONNECTED) && scene.has_lights();
+        let surfaces = scene.surfaces();
+        let pixels = size[0] * size[1];
+        let direct = shows_direct.then(|| Direct::new(gpu, &scene, &settings, pixels));
+        let indirect = shows_indirect.then(|| Indirect::new(gpu, &scene, &settings, size, shows_direct));
+        let (direct, indirect) = (direct.transpose()?, indirect.transpose()?);
+        let filters = indirect.as_ref().is_some_and(|indirect| indirect.split.filters());
+        let is_seen = shows_direct || shows_indirect;
+        let seen = is_seen.then(|| Seen::new(gpu, &surfaces, size, filters)).transpose()?;
+        let bytes = FrameTarget::bytes(size);
+        Ok(Self {
+            gpu: gpu.clone(),
+            seen,
+            coverage: Coverage::new(gpu)?,
+            parts: None,
+            direct,
+            indirect,
+            settings,
+            camera: camera.clone(),
+            film,
+            radiance: gpu.buffer(&BufferDesc::storage("frame", bytes, Category::Film))?,
+            frame: None,
+            done: 0,
+            counts: ManyLightCounts::default(),
+            scene,
+        })
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &ManyLightSettings {
+        &self.settings
+    }
+
+    /// The light paths of the picture.
+    pub fn path_set(&self) -> PathSet {
+        self.settings.path_set
+    }
+
+    /// Exact counts since it was made.
+    pub fn counts(&self) -> ManyLightCounts {
+        self.counts
+    }
+
+    /// What the scene needs.
+    pub fn profile(&self) -> &SceneProfile {
+        self.scene.profile()
+    }
+
+    /// Whether there are virtual lights.
+    pub fn has_virtual_lights(&self) -> bool {
+        self.indirect.is_some()
+    }
+
+    /// Whether there is light without them.
+    pub fn has_direct_light(&self) -> bool {
+        self.direct.is_some()
+    }
+
+    /// Bytes of what lies between passes: G-buffer, split picture, shadow maps; not the records of virtual lights, 64 bytes each.
+    pub fn bytes(&self) -> u64 {
+        let seen = self.seen.as_ref().map_or(0, |seen| seen.gbuffer.bytes());
+        let split = self.indirect.as_ref().map_or(0, |indirect| indirect.split.bytes());
+        let maps = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
+        seen + split + maps.map_or(0, |maps| maps.maps().bytes())
+    }
+
+    /// The kernels with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let mut all = Vec::new();
+        all.extend(self.seen.iter().flat_map(|seen| seen.gbuffer.pipelines()));
+        all.extend(self.direct.iter().map(Direct::info));
+        if let Some(indirect) = &self.indirect {
+            all.extend(indirect.tracer.pipelines());
+            all.extend(indirect.split.pipelines());
+            all.extend(indirect.maps.iter().flat_map(|maps| maps.maps().pipelines()));
+        }
+        all.extend(self.film.pipelines());
+        all
+    }
+
+    /// Looks through another camera and begins anew.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        CameraFrame::new(camera, self.film.size())?;
+        self.film.clear()?;
+        self.camera = camera.clone();
+        (self.done, self.frame, self.parts) = (0, None, None);
+        Ok(())
+    }
+
+    /// Forgets everything gathered so far and begins anew with this seed, with the kernels there are.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn restart(&mut self, seed: u32) -> Result<()> {
+        self.film.clear()?;
+        self.settings.seed = seed;
+        if let Some(direct) = &mut self.direct {
+            direct.set_seed(seed);
+        }
+        if let Some(indirect) = &mut self.indirect {
+            indirect.tracer.set_seed(seed);
+        }
+        (self.done, self.frame) = (0, None);
+        Ok(())
+    }
+
+    /// Does a bounded piece of work towards `samples` samples of each pixel, whatever the scene; `None` when all samples are there.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] for more virtual lights than the device can hold, and should the index have rays
+    /// that never end. The frame under way is then begun anew.
+    pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        if self.done >= samples {
+            return Ok(None);
+        }
+        let mut frame = match self.frame.take() {
+            Some(frame) => frame,
+            None => self.begin_frame()?,
+        };
+        let timings = self.advance(&mut frame)?;
+        if frame.has_ended() {
+            self.done += 1;
+            self.counts.frames += 1;
+        } else {
+            self.frame = Some(frame);
+        }
+        let pixels = self.pixels();
+        Ok(Some(Step {
+            timings,
+            done: u64::from(pixels) * u64::from(self.done),
+            wanted: u64::from(pixels) * u64::from(samples),
+        }))
+    }
+
+    /// The picture so far.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        self.film.picture()
+    }
+
+    /// Writes the picture so far to a buffer of four bytes per pixel: `exposure` in stops, clipped, sRGB-encoded.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
+    pub fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        self.film.display(target, exposure, format)
+    }
+
+    /// Of the picture.
+    pub(super) fn pixels(&self) -> u32 {
+        self.film.size().iter().product()
+    }
+}
+
+impl Indirect {
+    fn new(gpu: &Gpu, scene: &Arc<GpuScene>, settings: &ManyLightSettings, size: [u32; 2], adds: bool) -> Result<Self> {
+        let plan = PhotonPlan {
+            photons: settings.lights,
+            sampler: settings.sampler,
+            seed: settings.seed,
+            submission_work: settings.submission_work,
+            follows_footprints: false,
+            tells_caustics: false,
+            even_survival: false,
+            stores_lights: true,
+            // A mirror on the way would be a bounce.
+            stored: Stored {
+                first_bounce: 0,
+                last_bounce: 0,
+            },
+        };
+        let append = Box::new(LightAppend::new(gpu, scene)?);
+        let maps = (settings.visibility == Visibility::Maps)
+            .then(|| Maps::new(gpu, &scene.surfaces(), settings))
+            .transpose()?;
+        Ok(Self {
+            tracer: PhotonTracer::new(gpu, Arc::clone(scene), plan, append)?,
+            split: Split::new(gpu, scene, settings, size, adds, maps.as_ref())?,
+            maps,
+        })
+    }
+}

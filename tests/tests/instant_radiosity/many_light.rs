@@ -1,0 +1,598 @@
+//! Deferred frames of many lights against the path tracer, against themselves without tiles, and by exact counts.
+
+use super::*;
+use clerestory::Error;
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory::scene::{AlphaMode, Environment};
+use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Visibility};
+use clerestory_hard_cases::scenes::orthographic;
+use clerestory_tests::child::hash_in_child;
+use clerestory_tests::render::{camera_down, floor};
+use glam::DVec3;
+
+const UP_TO_ONCE: &str = "bounces=0..1,lobes=diffuse+glossy";
+const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
+const ALL: &str = "bounces=0..2,lobes=diffuse+glossy";
+/// Set in the processes that only print their picture's hash.
+const CHILD: &str = "CLERESTORY_TEST_PRINT_HASH";
+const CHILD_TEST: &str = "many_light::prints_its_hash_when_asked";
+
+/// Independent samples of few lights, with all that biases off.
+fn exact() -> ManyLightSettings {
+    ManyLightSettings {
+        lights: 64,
+        filter: false,
+        bound: Bound::None,
+        sampler: SamplerKind::Pcg,
+        seed: 5,
+        ..ManyLightSettings::default()
+    }
+}
+
+fn of(set: &str, settings: ManyLightSettings) -> ManyLightSettings {
+    ManyLightSettings {
+        path_set: set.parse().expect("path set"),
+        ..settings
+    }
+}
+
+fn frames(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &ManyLightSettings) -> ManyLight {
+    match ManyLight::new(gpu, upload(gpu, scene), &scene.cameras[0], size, settings.clone()) {
+        Ok(frames) => frames,
+        Err(error) => panic!("{}: {error}", scene.name),
+    }
+}
+
+/// Radiance after so many frames.
+fn picture(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &ManyLightSettings, count: u32) -> Vec<f32> {
+    let [radiance, _] = advance(&mut frames(gpu, scene, size, settings), count);
+    radiance
+}
+
+fn bits(radiance: &[f32]) -> Vec<u32> {
+    radiance.iter().map(|value| value.to_bits()).collect()
+}
+
+fn rmse(a: &[f32], b: &[f32]) -> f64 {
+    let squares = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2));
+    (squares.sum::<f64>() / a.len() as f64).sqrt()
+}
+
+/// A floor, a ceiling 2 m above it, and between them a slab that hides one from the other; seen from just under the ceiling, so that no virtual light is close to
+/// what is seen.
+fn hall() -> Scene {
+    let mut scene = Scene {
+        name: "hall".into(),
+        ..Scene::default()
+    };
+    let ground = scene.add_material(Material::lambert("ground", Vec3::new(0.7, 0.5, 0.3)));
+    let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
+    let blue = scene.add_material(Material::lambert("blue", Vec3::new(0.2, 0.4, 0.8)));
+    scene.place(floor("floor", ground, 3.0, 0.0));
+    scene.place(floor("ceiling", white, 3.0, 2.0));
+    let (lower, upper) = (Vec3::new(-0.4, 0.9, -0.4), Vec3::new(0.3, 1.0, 0.4));
+    scene.place(cuboid("slab", blue, lower, upper));
+    scene
+        .cameras
+        .push(orthographic(DVec3::Y * 1.9, DVec3::ZERO, -DVec3::Z, 1.0));
+    add_point(&mut scene, Vec3::new(0.5, 1.7, 0.2), Vec3::splat(20.0));
+    scene
+}
+
+/// The same with rough metal, a coat, a lamp and a sky.
+fn furnished() -> Scene {
+    let mut scene = hall();
+    scene.name = "furnished".into();
+    scene.materials[0] = Material {
+        specular: 1.0,
+        roughness: 0.5,
+        ..scene.materials[0].clone()
+    };
+    scene.materials[2] = Material {
+        metallic: 1.0,
+        roughness: 0.6,
+        ..scene.materials[2].clone()
+    };
+    let lamp = scene.add_material(Material {
+        emission: Vec3::new(20.0, 15.0, 10.0),
+        ..Material::lambert("lamp", Vec3::ZERO)
+    });
+    let lower = Vec3::new(-0.9, 1.5, -0.9);
+    scene.place(cuboid("lamp", lamp, lower, lower + Vec3::splat(0.2)));
+    scene.environment = Some(Environment::uniform(Vec3::new(0.2, 0.3, 0.5)));
+    scene
+}
+
+/// A floor with a step of 1 m, under a ceiling that a spot light shines on; seen from above, so that the step's sides are not.
+fn terrace() -> Scene {
+    let mut scene = Scene {
+        name: "terrace".into(),
+        ..Scene::default()
+    };
+    let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
+    scene.place(floor("floor", white, 3.0, 0.0));
+    scene.place(floor("ceiling", white, 3.0, 2.2));
+    scene.place(cuboid(
+        "step",
+        white,
+        Vec3::new(-0.4, 0.0, -0.4),
+        Vec3::new(0.4, 1.0, 0.4),
+    ));
+    scene
+        .cameras
+        .push(orthographic(DVec3::Y * 2.1, DVec3::ZERO, -DVec3::Z, 1.0));
+    scene.add_light(
+        "spot",
+        LightKind::Spot {
+            position: Vec3::Y * 1.9,
+            direction: Vec3::Y,
+            intensity: Vec3::splat(5.0),
+            inner: 0.3,
+            outer: 0.5,
+        },
+    );
+    scene
+}
+
+#[test]
+fn frames_with_rays_are_the_path_tracers() {
+    with_gpu(|gpu| {
+        for (scene, lights) in [(hall(), 64), (furnished(), 128)] {
+            let reference = render(gpu, &scene, SIZE, 2048, &paths(ALL));
+            let settings = ManyLightSettings { lights, ..exact() };
+            let mut renderer = frames(gpu, &scene, SIZE, &settings);
+            let found = passes_of(&mut renderer, SIZE, 1, 64);
+            found.expect_same_as(&scene.name, &reference, 0.0);
+            let counts = renderer.counts();
+            assert_eq!((counts.frames, counts.walks.emitted), (64, u64::from(64 * lights)));
+            // Some walks leave by the sides of the hall.
+            assert!(
+                counts.walks.escaped > 0 && counts.lights < counts.walks.emitted,
+                "{counts:?}"
+            );
+            // Each pixel has had its part of the lights: about a sixteenth.
+            let share = counts.connections as f64 / (counts.lights * 144) as f64;
+            assert!((share * 16.0 - 1.0).abs() < 0.05, "{share}");
+            assert!(counts.visibility_tests < counts.connections);
+        }
+    });
+}
+
+#[test]
+fn direct_light_is_the_path_tracers() {
+    with_gpu(|gpu| {
+        for scene in [hall(), furnished()] {
+            let reference = render(gpu, &scene, SIZE, 2048, &paths(UP_TO_ONCE));
+            let mut renderer = frames(gpu, &scene, SIZE, &of(UP_TO_ONCE, exact()));
+            let found = passes_of(&mut renderer, SIZE, 1, 64);
+            found.expect_same_as(&scene.name, &reference, 0.0);
+            assert_eq!(renderer.counts().walks.emitted, 0);
+        }
+    });
+}
+
+/// In a sphere every virtual light brings the same to every point, so that pictures tell its power and nothing else.
+fn sphere_of_point() -> Scene {
+    let mut scene = builtin("builtin:sphere-light?rho=0.5&frequency=12");
+    scene.lights.clear();
+    add_point(&mut scene, Vec3::ZERO, Vec3::ONE);
+    scene
+}
+
+#[test]
+fn twice_the_lights_are_as_bright() {
+    with_gpu(|gpu| {
+        let scene = sphere_of_point();
+        let brightness = |lights| {
+            let settings = of(INDIRECT, ManyLightSettings { lights, ..exact() });
+            mean(&picture(gpu, &scene, SIZE, &settings, 8), 1)
+        };
+        // ρ² Φ/(4π² R²).
+        let expected = 0.25 / (4.0 * PI * PI);
+        // 250 and 500 are no multiples of the 16 parts.
+        let found = [250, 500, 512, 1024].map(brightness);
+        println!("{found:?}, expected {expected}");
+        for found in found {
+            // Facets are nearer to the middle than the sphere is.
+            assert!((found / expected - 1.0).abs() < 0.03, "{found} instead of {expected}");
+        }
+        for pair in found.windows(2) {
+            assert!((pair[1] / pair[0] - 1.0).abs() < 0.005, "{pair:?}");
+        }
+    });
+}
+
+#[test]
+fn parts_of_the_lights_bring_as_much_as_all() {
+    with_gpu(|gpu| {
+        let scene = sphere_of_point();
+        let brightness = |lights, interleave| {
+            let settings = ManyLightSettings {
+                lights,
+                interleave,
+                ..exact()
+            };
+            mean(&picture(gpu, &scene, SIZE, &of(INDIRECT, settings), 16), 1)
+        };
+        let all = brightness(37, 1);
+        // Parts of two or three lights, of one, and fewer lights than parts.
+        for (lights, interleave) in [(37, 4), (37, 5), (5, 4)] {
+            let found = brightness(lights, interleave);
+            assert!(
+                (found / all - 1.0).abs() < 0.02,
+                "{lights} {interleave}: {found} instead of {all}"
+            );
+        }
+    });
+}
+
+#[test]
+fn tiles_that_have_all_lights_give_the_same_bits() {
+    with_gpu(|gpu| {
+        let scene = hall();
+        for size in [[13, 7], [1, 1], [9, 33]] {
+            let with = |interleave| {
+                let settings = ManyLightSettings {
+                    lights: 20,
+                    interleave,
+                    whole_sets: true,
+                    ..exact()
+                };
+                bits(&picture(gpu, &scene, size, &settings, 2))
+            };
+            let whole = with(1);
+            for interleave in [2, 3, 4, 16] {
+                assert!(with(interleave) == whole, "{size:?} {interleave}");
+            }
+        }
+        // Not so where each has its part.
+        let parted = |interleave| picture(gpu, &scene, [13, 7], &ManyLightSettings { interleave, ..exact() }, 1);
+        assert_ne!(bits(&parted(1)), bits(&parted(4)));
+    });
+}
+
+#[test]
+fn frames_do_not_depend_on_how_work_is_shared_out() {
+    with_gpu(|gpu| {
+        let scene = hall();
+        for visibility in [Visibility::Rays, Visibility::Maps] {
+            let base = ManyLightSettings {
+                visibility,
+                map_side: 16,
+                interleave: 3,
+                lights: 50,
+                ..exact()
+            };
+            let all = |settings: &ManyLightSettings| {
+                let mut renderer = frames(gpu, &scene, [13, 7], settings);
+                let radiance = bits(&advance(&mut renderer, 2)[0]);
+                let mut counts = renderer.counts();
+                counts.passes = 0;
+                (radiance, counts)
+            };
+            let whole = all(&base);
+            assert_eq!(whole.1.maps > 0, visibility == Visibility::Maps);
+            let parted = ManyLightSettings {
+                lights_at_once: 3,
+                maps_at_once: 7,
+                submission_work: 1,
+                ..base.clone()
+            };
+            assert!(all(&parted) == whole, "{visibility:?}");
+            // Begun anew, and with another seed.
+            let mut renderer = frames(gpu, &scene, [13, 7], &base);
+            renderer.step(2).expect("a step");
+            renderer.set_camera(&scene.cameras[0]).expect("a camera");
+            assert!(bits(&advance(&mut renderer, 2)[0]) == whole.0, "{visibility:?}");
+            renderer.restart(6).expect("another seed");
+            assert!(bits(&advance(&mut renderer, 2)[0]) != whole.0, "{visibility:?}");
+            renderer.restart(base.seed).expect("the first seed");
+            assert!(bits(&advance(&mut renderer, 2)[0]) == whole.0, "{visibility:?}");
+        }
+    });
+}
+
+#[test]
+fn what_is_not_needed_is_not_recorded() {
+    with_gpu(|gpu| {
+        let scene = hall();
+        let once = |settings: &ManyLightSettings| {
+            let mut renderer = frames(gpu, &scene, [16, 8], settings);
+            advance(&mut renderer, 1);
+            let has = |name: &str| {
+                renderer
+                    .pipelines()
+                    .iter()
+                    .any(|pipeline| pipeline.shader.contains(name))
+            };
+            let kernels = ["deferred_direct", "deferred_gather", "photon_emit", "surface_octant"].map(has);
+            let counts = renderer.counts();
+            (counts.passes, counts.maps, kernels, renderer.bytes())
+        };
+        // Surfaces, split, direct light, gather, merge, film.
+        let (passes, maps, kernels, bytes) = once(&exact());
+        assert_eq!((passes, maps), (6, 0));
+        assert_eq!(kernels, [true, true, true, false]);
+        let none = ManyLightSettings {
+            visibility: Visibility::None,
+            ..exact()
+        };
+        let (passes, maps, kernels, bytes_of_none) = once(&none);
+        assert_eq!((passes, maps, bytes_of_none), (6, 0, bytes));
+        assert_eq!(kernels, [true, true, true, false]);
+        // Two more for each light with a map.
+        let by_maps = ManyLightSettings {
+            visibility: Visibility::Maps,
+            map_side: 8,
+            ..exact()
+        };
+        let (passes, maps, kernels, bytes_of_maps) = once(&by_maps);
+        assert!(maps > 32 && maps <= 64, "{maps}");
+        assert_eq!(passes, 6 + 2 * maps);
+        assert_eq!(kernels, [true, true, true, true]);
+        assert!(bytes_of_maps > bytes);
+        // Positions and normals of 16 · 8 pixels, and colours of 16 tiles with 64 places each; without a filter the least that a buffer has.
+        let filtered = ManyLightSettings {
+            filter: true,
+            ..exact()
+        };
+        let (passes, _, _, bytes_of_filter) = once(&filtered);
+        assert_eq!((passes, bytes_of_filter - bytes), (6, 24 * 128 + 12 * 16 * 64 - 16));
+        // A picture without tiles has nothing to average.
+        let one_tile = ManyLightSettings {
+            interleave: 1,
+            ..filtered
+        };
+        assert!(once(&one_tile).3 < bytes);
+        // Surfaces, direct light, film.
+        let (passes, _, kernels, _) = once(&of(UP_TO_ONCE, by_maps.clone()));
+        assert_eq!((passes, kernels), (3, [true, false, false, false]));
+        // Without direct light.
+        let (passes, _, kernels, _) = once(&of(INDIRECT, exact()));
+        assert_eq!((passes, kernels), (5, [false, true, true, false]));
+        // Nothing that is seen emits: a black picture, and the film.
+        let (passes, _, kernels, bytes) = once(&of("emitted", exact()));
+        assert_eq!((passes, kernels, bytes), (2, [false; 4], 0));
+    });
+}
+
+#[test]
+fn scenes_without_lights_are_black_and_walks_that_leave_do_no_harm() {
+    with_gpu(|gpu| {
+        let mut open = Scene {
+            name: "floor".into(),
+            ..Scene::default()
+        };
+        let matte = open.add_material(Material::lambert("matte", Vec3::splat(0.5)));
+        open.place(floor("floor", matte, 1.0, 0.0));
+        open.cameras.push(camera_down(0.8, 5.0));
+        for size in [[13, 7], [1, 1], [3, 40]] {
+            let mut dark = frames(gpu, &open, size, &exact());
+            assert!(!dark.has_virtual_lights());
+            assert!(advance(&mut dark, 2)[0].iter().all(|value| *value == 0.0));
+            assert_eq!(dark.counts().walks.emitted, 0);
+        }
+        // A floor alone lights nothing that is seen of it; its own light is there.
+        let mut lit = open.clone();
+        add_point(&mut lit, Vec3::Y, Vec3::ONE);
+        let mut once = frames(gpu, &lit, [13, 7], &of(INDIRECT, exact()));
+        assert!(advance(&mut once, 2)[0].iter().all(|value| *value == 0.0));
+        assert!(once.counts().lights > 0);
+        // All walks leave.
+        let mut away = open;
+        away.add_light(
+            "spot",
+            LightKind::Spot {
+                position: Vec3::Y,
+                direction: Vec3::Y,
+                intensity: Vec3::ONE,
+                inner: 0.1,
+                outer: 0.2,
+            },
+        );
+        for (set, visibility) in [(ALL, Visibility::Rays), (INDIRECT, Visibility::Maps)] {
+            let settings = ManyLightSettings { visibility, ..exact() };
+            let mut away = frames(gpu, &away, [13, 7], &of(set, settings));
+            assert!(advance(&mut away, 2)[0].iter().all(|value| *value == 0.0));
+            let counts = away.counts();
+            assert_eq!((counts.lights, counts.walks.escaped, counts.connections), (0, 128, 0));
+            // Surfaces, direct light, film; where nothing else is shown a black picture, and the film.
+            assert_eq!(counts.passes, if set == ALL { 2 * 3 } else { 2 * 2 });
+        }
+    });
+}
+
+/// The same lights, seen through everything, by coarse maps, by finer ones, and by rays.
+#[test]
+fn errors_of_visibility_fall_from_none_over_maps_to_rays() {
+    with_gpu(|gpu| {
+        let scene = hall();
+        let by = |visibility, map_side| {
+            let settings = ManyLightSettings {
+                lights: 48,
+                interleave: 1,
+                visibility,
+                map_side,
+                ..exact()
+            };
+            picture(gpu, &scene, [24; 2], &of(INDIRECT, settings), 2)
+        };
+        let rays = by(Visibility::Rays, 8);
+        let error = |radiance: Vec<f32>| rmse(&radiance, &rays) / mean(&rays, 0);
+        let none = by(Visibility::None, 8);
+        // What is hidden is missing from no picture.
+        assert!(none.iter().zip(&rays).all(|(none, rays)| none >= rays));
+        let [none, coarse, fine] = [none, by(Visibility::Maps, 16), by(Visibility::Maps, 128)].map(error);
+        println!("none {none:.4}, maps of 16 {coarse:.4}, of 128 {fine:.4}");
+        assert!(
+            none > 2.0 * coarse && coarse > 2.0 * fine && fine > 0.0,
+            "{none} {coarse} {fine}"
+        );
+    });
+}
+
+#[test]
+fn filters_average_what_lies_in_one_plane_alone() {
+    with_gpu(|gpu| {
+        let scene = terrace();
+        let with = |filter, filter_plane, filter_normal| {
+            let settings = ManyLightSettings {
+                lights: 32,
+                filter,
+                filter_plane,
+                filter_normal,
+                whole_sets: true,
+                ..exact()
+            };
+            picture(gpu, &scene, [24; 2], &of(INDIRECT, settings), 1)
+        };
+        let (raw, filtered) = (with(false, 0.01, 0.9), with(true, 0.01, 0.9));
+        // The step is so much nearer to the ceiling that what is seen of it is brighter than all of the floor.
+        let most = raw.iter().copied().fold(0.0, f32::max);
+        let is_step = |value: f32| value > 0.5 * most;
+        let range = |step: bool| {
+            let values = raw.iter().copied().filter(|value| is_step(*value) == step);
+            values.fold([f32::INFINITY, 0.0], |[low, high], value| {
+                [low.min(value), high.max(value)]
+            })
+        };
+        let (ground, step) = (range(false), range(true));
+        assert!(step[0] > 1.5 * ground[1], "{ground:?} {step:?}");
+        let mixes = |radiance: &[f32]| {
+            let pairs = raw.iter().zip(radiance);
+            let strange = pairs.filter(|(raw, value)| {
+                let [low, high] = if is_step(**raw) { step } else { ground };
+                **value < low * 0.999_999 || **value > high * 1.000_001
+            });
+            strange.count()
+        };
+        assert_eq!(mixes(&filtered), 0);
+        assert_ne!(bits(&filtered), bits(&raw));
+        // Where all planes count as one, the step and the floor are mixed, and where no normal is like another, nothing is.
+        assert!(mixes(&with(true, 1.0, 0.9)) > 20);
+        assert_eq!(bits(&with(true, 1.0, 1.0)), bits(&raw));
+    });
+}
+
+#[test]
+fn filtered_tiles_are_nearly_what_all_lights_bring() {
+    with_gpu(|gpu| {
+        let mut scene = terrace();
+        // The floor and the ceiling alone.
+        scene.instances.pop();
+        let with = |interleave, filter| {
+            let settings = ManyLightSettings {
+                lights: 512,
+                interleave,
+                filter,
+                ..exact()
+            };
+            picture(gpu, &scene, [32; 2], &of(INDIRECT, settings), 1)
+        };
+        let (all, parted, filtered) = (with(1, false), with(4, false), with(4, true));
+        let inside = |radiance: &[f32]| -> Vec<f32> {
+            let rows = (4..28).flat_map(|y| (4..28).map(move |x| 3 * (32 * y + x)));
+            rows.map(|i| radiance[i]).collect()
+        };
+        let (all, parted, filtered) = (inside(&all), inside(&parted), inside(&filtered));
+        let level = f64::from(all.iter().sum::<f32>()) / all.len() as f64;
+        let (before, after) = (rmse(&parted, &all) / level, rmse(&filtered, &all) / level);
+        println!("{before:.4} without, {after:.4} with a filter");
+        assert!(after < 0.01 && after < 0.3 * before, "{before} {after}");
+    });
+}
+
+#[test]
+fn what_frames_cannot_model_is_refused_by_name() {
+    with_gpu(|gpu| {
+        let mut unlit = hall();
+        unlit.materials[0].unlit = true;
+        let mut blended = hall();
+        blended.materials[0].alpha_mode = AlphaMode::Blend;
+        blended.materials[0].base_color.w = 0.5;
+        for (scene, word) in [
+            (builtin("builtin:fog-box"), "media"),
+            (unlit, "unlit"),
+            (blended, "alpha"),
+        ] {
+            let options = RenderOptions {
+                technique: Some("many-light".into()),
+                size: SIZE,
+                spp: 1,
+                ..RenderOptions::default()
+            };
+            let rendered = Renderer::new(gpu, &scene).and_then(|renderer| renderer.render(&options));
+            let Err(error) = rendered else {
+                panic!("{} was rendered", scene.name);
+            };
+            assert!(
+                matches!(&error, Error::Unsupported { technique, .. } if technique == "many-light"),
+                "{error}"
+            );
+            assert!(error.to_string().contains(word), "{error}");
+            let made = ManyLight::new(gpu, upload(gpu, &scene), &scene.cameras[0], SIZE, exact());
+            assert!(
+                made.is_err_and(|error| error.to_string().contains(word)),
+                "{}",
+                scene.name
+            );
+        }
+        let scene = upload(gpu, &hall());
+        let camera = &hall().cameras[0];
+        for (settings, word) in [
+            (of("all", exact()), "path_set"),
+            (ManyLightSettings { lights: 0, ..exact() }, "lights"),
+            (
+                ManyLightSettings {
+                    interleave: 17,
+                    ..exact()
+                },
+                "interleave",
+            ),
+            (ManyLightSettings { map_side: 4, ..exact() }, "map_side"),
+        ] {
+            let error = ManyLight::new(gpu, scene.clone(), camera, SIZE, settings).err();
+            let text = error.map(|error| error.to_string()).unwrap_or_default();
+            assert!(text.contains(word), "{word}: {text}");
+        }
+        assert!(ManyLight::new(gpu, scene, camera, [0, 4], exact()).is_err());
+    });
+}
+
+#[test]
+fn threads_and_widths_of_the_driver_never_show() {
+    let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
+    let truth = hash(&[("LP_NUM_THREADS", "2")]);
+    for variables in [
+        [("LP_NUM_THREADS", "1"), ("LP_NATIVE_VECTOR_WIDTH", "128")],
+        [("LP_NUM_THREADS", "2"), ("LP_NATIVE_VECTOR_WIDTH", "512")],
+    ] {
+        assert_eq!(hash(&variables), truth, "{variables:?}");
+    }
+}
+
+#[test]
+fn prints_its_hash_when_asked() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    with_gpu(|gpu| {
+        let mut all = Vec::new();
+        for visibility in [Visibility::Rays, Visibility::Maps] {
+            let settings = ManyLightSettings {
+                visibility,
+                map_side: 16,
+                lights: 50,
+                filter: true,
+                sampler: SamplerKind::Sobol,
+                ..exact()
+            };
+            all.extend(bits(&picture(gpu, &hall(), [13, 7], &settings, 1)));
+        }
+        // FNV-1a over words.
+        let hash = all.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, word| {
+            (hash ^ u64::from(*word)).wrapping_mul(0x0100_0000_01b3)
+        });
+        println!("hash {hash:016x}");
+    });
+}
