@@ -38,6 +38,7 @@ methods! {
     preview,
     ambient,
     instant_radiosity,
+    bidirectional,
 }
 
 use std::collections::BTreeMap;

@@ -1,0 +1,180 @@
+//! Settings of bidirectional path tracing.
+
+use crate::gpu::shaders::constants::{
+    STRATEGY_COMBINED, STRATEGY_CONNECTIONS, STRATEGY_EMISSION, STRATEGY_LIGHT_SAMPLES, STRATEGY_SPLATS,
+};
+use crate::settings::AboveTo;
+use crate::transport::PathSet;
+use crate::transport::path_set::PATH_SET_LOBES;
+use crate::transport::random::SamplerKind;
+use crate::{Error, Result};
+
+/// Light subpaths of a pass, at most: their vertices then stay within the buffers of the baseline even where nothing absorbs.
+pub(super) const LIGHT_PATHS_MAX: u32 = 1 << 16;
+/// Scatterings that are counted at most.
+const BOUNCES_MAX: u32 = 4000;
+/// Scatterings that light subpaths are followed through at most, so that none is followed for ever between lossless surfaces.
+const WALK_BOUNCES_MAX: u32 = 4096;
+
+/// Ways in which a path is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Strategies {
+    /// All, weighted by the balance heuristic.
+    #[default]
+    Combined,
+    /// Eye paths that meet the lamp, alone and in full.
+    Emission,
+    /// Eye paths that sample a light, alone and in full.
+    LightSamples,
+    /// Eye paths that are joined to light subpaths, alone, each way to join a path in full.
+    Connections,
+    /// Light subpaths that meet the camera, alone and in full.
+    Splats,
+}
+
+impl Strategies {
+    /// What kernels are specialized by.
+    pub(super) fn kind(self) -> u32 {
+        match self {
+            Self::Combined => STRATEGY_COMBINED,
+            Self::Emission => STRATEGY_EMISSION,
+            Self::LightSamples => STRATEGY_LIGHT_SAMPLES,
+            Self::Connections => STRATEGY_CONNECTIONS,
+            Self::Splats => STRATEGY_SPLATS,
+        }
+    }
+
+    /// Whether eye paths are joined to light subpaths.
+    pub(super) fn connects(self) -> bool {
+        matches!(self, Self::Combined | Self::Connections)
+    }
+
+    /// Whether light subpaths meet the camera.
+    pub(super) fn splats(self) -> bool {
+        matches!(self, Self::Combined | Self::Splats)
+    }
+}
+
+crate::settings! {
+    /// Settings of bidirectional path tracing.
+    pub struct BidirectionalSettings {
+        /// Light subpaths of a pass, in which every pixel has one sample; 0 for as many as there are pixels, up to 65536. Changes the noise only.
+        pub light_paths: u32 = 0, in 0..=LIGHT_PATHS_MAX, unit "paths per pass";
+        /// Vertices of light subpaths that each vertex of an eye path is joined to, drawn evenly from all of the pass; changes the noise only.
+        pub connections: u32 = 1, in 1..=16, unit "connections";
+        /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
+        pub sampler: SamplerKind = SamplerKind::Sobol;
+        /// First bounce at which Russian roulette may end an eye path; changes the noise only.
+        pub roulette_start: u32 = 4, in 0..=4096, unit "bounces";
+        /// Greatest probability of surviving a round of roulette; changes the noise only.
+        pub roulette_cap: f32 = 0.95, in AboveTo(0.0, 0.999), unit "probability";
+    }
+    unlisted {
+        /// Which ways to make a path there are: all, or one alone, to check it; pictures then have only what it finds.
+        pub strategies: Strategies = Strategies::Combined;
+        /// Seed of the random numbers. A [`View`](crate::techniques::View) gives its own.
+        pub seed: u32 = 0;
+        /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
+        pub aovs: bool = false;
+        /// Scatterings of the light that is shown, at least.
+        pub least_bounces: u32 = 0, in 0..=BOUNCES_MAX;
+        /// And at most; `None` for any number.
+        pub most_bounces: Option<u32> = None;
+        /// Work of walks, of eye paths and of shadow rays, in loop iterations, after which a submission begins no further place, as
+        /// [`WalkOptions::work`](crate::walk::WalkOptions::work); 0 chooses by the kind of device. Never changes the picture.
+        pub submission_work: u64 = 0;
+        /// Eye paths under way together, at most; 0 chooses by the kind of device. Never changes the picture.
+        pub paths_in_flight: u32 = 0;
+    }
+    check BidirectionalSettings::has_a_range;
+}
+
+impl BidirectionalSettings {
+    fn has_a_range(&self) -> Result<()> {
+        self.path_set().map(|_| ())
+    }
+
+    /// The least and the greatest number of scatterings.
+    pub(super) fn bounces(&self) -> [u32; 2] {
+        [self.least_bounces, self.most_bounces.unwrap_or(u32::MAX)]
+    }
+
+    /// Scatterings of light subpaths before their last vertex, at most.
+    pub(super) fn walk_bounces(&self) -> u32 {
+        self.most_bounces
+            .map_or(WALK_BOUNCES_MAX, |most| most.saturating_sub(1).min(WALK_BOUNCES_MAX))
+    }
+
+    /// Whether there are light subpaths: of one vertex at least, and something that is made of them.
+    pub(super) fn has_light_paths(&self) -> bool {
+        self.most_bounces != Some(0) && (self.strategies.connects() || self.strategies.splats())
+    }
+
+    /// Light subpaths of a pass of so many pixels.
+    pub(super) fn light_paths_of(&self, pixels: u32) -> u32 {
+        match self.light_paths {
+            0 => pixels.clamp(1, LIGHT_PATHS_MAX),
+            wanted => wanted,
+        }
+    }
+
+    /// The light paths of the picture.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a range that is empty.
+    pub(super) fn path_set(&self) -> Result<PathSet> {
+        if self.most_bounces.is_some_and(|most| most < self.least_bounces) {
+            let cause = format!("is less than the least number of bounces, {}", self.least_bounces);
+            return Err(Error::setting("most_bounces", self.bounces()[1], cause));
+        }
+        PathSet::new(self.least_bounces, self.most_bounces, PATH_SET_LOBES)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::TypedSettings;
+
+    #[test]
+    fn ranges_of_bounces_decide_how_far_light_subpaths_go() {
+        let of = |least_bounces, most_bounces| BidirectionalSettings {
+            least_bounces,
+            most_bounces,
+            ..BidirectionalSettings::default()
+        };
+        assert_eq!(of(0, None).path_set().unwrap(), PathSet::ALL);
+        assert_eq!(
+            (of(0, None).walk_bounces(), of(0, None).has_light_paths()),
+            (4096, true)
+        );
+        // The last scattering is towards the eye.
+        assert_eq!(
+            (of(1, Some(1)).walk_bounces(), of(1, Some(1)).has_light_paths()),
+            (0, true)
+        );
+        assert_eq!(of(1, Some(3)).walk_bounces(), 2);
+        assert!(!of(0, Some(0)).has_light_paths());
+        assert!(of(3, Some(2)).check().unwrap_err().to_string().contains("most_bounces"));
+        let alone = BidirectionalSettings {
+            strategies: Strategies::LightSamples,
+            ..of(0, None)
+        };
+        assert!(!alone.has_light_paths());
+    }
+
+    #[test]
+    fn a_pass_has_a_light_subpath_a_pixel_up_to_what_buffers_hold() {
+        let settings = BidirectionalSettings::default();
+        assert_eq!(
+            [1, 640, 1 << 20].map(|pixels| settings.light_paths_of(pixels)),
+            [1, 640, 1 << 16]
+        );
+        let few = BidirectionalSettings {
+            light_paths: 3,
+            ..settings
+        };
+        assert_eq!(few.light_paths_of(640), 3);
+    }
+}
