@@ -1,6 +1,6 @@
 #version 460
 // What vertices of light subpaths show the camera: the pixel and the radiance that each adds to it, weighted against all other ways to make the path, where nothing
-// stands between. The mean of a pixel's light is that over all walks of a pass.
+// stands between. The mean of a pixel's light is that over all walks of a group.
 //
 // A vertex whose ray a quota stops marks itself; further dispatches go on there. Thin lenses have a point of their own for each vertex.
 // Veach 1997, 10.3.2; I. Georgiev, "Implementing Vertex Connection and Merging", 2012. Deterministic in (seed, pass, vertex).
@@ -32,7 +32,7 @@ layout(push_constant, scalar) uniform Push {
     vec3 scene_upper;
     uint most_bounces;
     uint pass;
-    uint walks;
+    uint walks;         // of a group
     uint seed;
     uint first;         // vertex
     uint end;
@@ -99,7 +99,7 @@ vec3 splat(LightVertex vertex, uvec4 words, out uint pixel, out Ray ray) {
     Arrival a = arrival_at(Hit(0.0, vertex.barycentrics, vertex.triangle), vertex.direction, push.scene_lower, push.scene_upper);
     SurfacePoint point = a.surface.point;
     Sight seen = sight(point.position, words);
-    pixel = seen.pixel;
+    pixel = seen.pixel == SPLAT_NONE ? SPLAT_NONE : vertex.group * push.width * push.height + seen.pixel;
     uint bounces = vertex.bounce + 1u;
     float cos_lit = abs(dot(a.wo, a.surface.geometric_normal));
     ray = Ray(vec3(0.0), 0.0, vec3(0.0), 1.0);

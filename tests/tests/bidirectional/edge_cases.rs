@@ -3,6 +3,7 @@
 use super::*;
 use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
+use clerestory::techniques::PathTracerSettings;
 use clerestory_tests::child::hash_in_child;
 use clerestory_tests::gpu;
 use clerestory_tests::render::{camera_down, floor};
@@ -28,12 +29,13 @@ fn pictures_do_not_depend_on_how_the_work_is_cut_up() {
         // Pixels that fill no workgroup.
         let base = BidirectionalSettings {
             light_paths: 300,
+            samples_per_pass: 4,
             connections: 3,
             ..settings()
         };
         let of = |settings: &BidirectionalSettings| {
             let mut renderer = renderer(gpu, &scene, [13, 7], settings);
-            let picture = bits(&advance(&mut renderer, 3));
+            let picture = bits(&advance(&mut renderer, 6));
             let counts = renderer.counts();
             (picture, [counts.light_vertices, counts.connections, counts.shadow_rays])
         };
@@ -59,7 +61,11 @@ fn pictures_do_not_depend_on_how_the_work_is_cut_up() {
         advance(&mut renderer, 1);
         renderer.set_camera(&scene.cameras[0]).expect("camera");
         renderer.restart(base.seed).expect("seed");
-        assert_eq!(bits(&advance(&mut renderer, 3)), whole);
+        // Within passes and over their ends.
+        for samples in [1, 3, 5] {
+            advance(&mut renderer, samples);
+        }
+        assert_eq!(bits(&advance(&mut renderer, 6)), whole);
     });
 }
 
@@ -118,16 +124,24 @@ fn scenes_without_lights_or_reflection_have_nothing_to_join() {
         let counts = black.counts();
         assert_eq!(
             (counts.light_paths, counts.light_vertices, counts.connections),
-            (2048, 0, 0)
+            (4096, 0, 0)
         );
         // Light that is not scattered has no need of light subpaths.
         let emitted = BidirectionalSettings {
             most_bounces: Some(0),
             ..settings()
         };
-        let mut emitted = renderer(gpu, &lit_room(), SIZE, &emitted);
+        let lit = builtin("builtin:cornell-box");
+        let mut emitted = renderer(gpu, &lit, SIZE, &emitted);
         assert!(!emitted.has_light_paths());
-        advance(&mut emitted, 1);
+        // It is what the path tracer's camera rays meet, to the bit.
+        let path = PathTracerSettings {
+            seed: settings().seed,
+            ..paths("emitted")
+        };
+        let seen = render(gpu, &lit, SIZE, 3, &path);
+        assert!(seen.mean()[0].0 > 0.0);
+        assert_eq!(bits(&advance(&mut emitted, 3)), seen.bits());
     });
 }
 

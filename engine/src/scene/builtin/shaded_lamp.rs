@@ -107,7 +107,6 @@ fn build(values: &Values) -> Result<Scene> {
 #[cfg(test)]
 mod tests {
     use super::super::generate;
-    use super::*;
 
     #[test]
     fn the_panel_shines_into_the_bowl_and_has_the_same_power_whatever_its_size() {

@@ -1,4 +1,4 @@
-//! Eye subpaths: waves of one sample each of consecutive pixels, on the path tracer's camera rays and film.
+//! Eye subpaths: waves of consecutive pixels with the samples of a pass, on the path tracer's camera rays and film.
 
 use super::connect::{Connect, ConnectStage};
 use super::kernels::{Counts, set_of, work};
@@ -21,13 +21,14 @@ use crate::walk::{
 };
 use std::f32::consts::PI;
 
-/// A wave: a sample each of consecutive pixels of a band of the film.
+/// A wave: consecutive pixels of a band of the film × consecutive samples of a pass.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct EyeWave {
     pub band: usize,
     pub first_pixel: u32,
     pub pixels: u32,
-    pub sample: u32,
+    pub first_sample: u32,
+    pub samples: u32,
 }
 
 /// Where the next wave begins.
@@ -37,42 +38,54 @@ pub(super) struct Cursor {
     in_band: u32,
     /// Samples that all pixels have.
     pub sample: u32,
+    /// Samples of each pixel in the waves of this way over the picture.
+    samples: u32,
     /// Samples of all pixels.
     pub done: u64,
 }
 
 impl EyeWave {
+    /// Its paths.
+    pub fn paths(&self) -> u32 {
+        self.pixels * self.samples
+    }
+
+    /// What their random numbers are keyed by.
     pub fn key(&self, seed: u32) -> WalkKey {
         WalkKey {
             first_sequence: self.first_pixel,
-            first_index: self.sample,
-            indices: 1,
+            first_index: self.first_sample,
+            indices: self.samples,
             seed,
         }
     }
 }
 
 impl Cursor {
-    /// The next wave of at most `slots` paths, and where the one after it begins.
-    pub fn next_wave(&self, film: &GpuFilm, slots: u32) -> (EyeWave, Self) {
+    /// The next wave of at most `slots` paths towards `wanted` samples per pixel, of which a pass has `each`; and where the one after it begins.
+    pub fn next_wave(&self, film: &GpuFilm, slots: u32, each: u32, wanted: u32) -> (EyeWave, Self) {
         let mut c = *self;
         let bands = film.bands();
         let band = &bands[c.band];
-        let pixels = (band.pixels() - c.in_band).min(slots);
+        if c.band == 0 && c.in_band == 0 {
+            c.samples = (each - c.sample % each).min(wanted.saturating_sub(c.sample)).max(1);
+        }
+        let pixels = (band.pixels() - c.in_band).min(slots / c.samples);
         let wave = EyeWave {
             band: c.band,
             first_pixel: band.first_pixel() + c.in_band,
             pixels,
-            sample: c.sample,
+            first_sample: c.sample,
+            samples: c.samples,
         };
         c.in_band += pixels;
         if c.in_band == band.pixels() {
             (c.band, c.in_band) = (c.band + 1, 0);
         }
         if c.band == bands.len() {
-            (c.band, c.sample) = (0, c.sample + 1);
+            (c.band, c.sample) = (0, c.sample + c.samples);
         }
-        c.done += u64::from(pixels);
+        c.done += u64::from(wave.paths());
         (wave, c)
     }
 }
@@ -119,8 +132,9 @@ impl EyeMemory {
             0 => default_slots(gpu),
             wanted => wanted,
         };
+        let paths = pixels.saturating_mul(settings.pass_of(pixels)[0]);
         let slots = wanted
-            .min(pixels)
+            .min(paths)
             .max(1)
             .next_multiple_of(WALK_GROUP)
             .min(slots_of_device(gpu));
@@ -242,13 +256,13 @@ impl<'a> EyeStages<'a> {
             ..
         } = parts;
         let shown = lights.filter(|lights| lights.meet_the_camera());
-        let camera_measure = shown.map_or(0.0, |lights| lights.walks() as f32 * kernels.pixel_area(size));
+        let camera_measure = shown.map_or(0.0, |lights| lights.walks()[1] as f32 * kernels.pixel_area(size));
         let connect = match (
             &kernels.connect,
             lights.map(|lights| (lights.vertices(), lights.walks())),
         ) {
             // Where no walk has left a vertex, there is nothing to join.
-            (Some(connect), Some(((vertices, count), walks))) if count > 0 => Some(ConnectStage {
+            (Some(connect), Some(((vertices, count), [walks, _]))) if count > 0 => Some(ConnectStage {
                 connect,
                 scene,
                 memory,
@@ -299,10 +313,10 @@ impl WalkStages for EyeStages<'_> {
         let push = path_camera::Push {
             view: self.view(),
             key: self.wave.key(settings.seed),
-            slot_count: self.wave.pixels,
+            slot_count: self.wave.paths(),
         };
         recorder.pass("bidirectional: camera", |pass| {
-            let groups = [camera.groups_for(self.wave.pixels), 1, 1];
+            let groups = [camera.groups_for(self.wave.paths()), 1, 1];
             pass.dispatch(camera, &[wave, &memory.path_slots()], &push, groups)?;
             stage_barrier(pass);
             Ok(())
@@ -359,7 +373,7 @@ impl WalkStages for EyeStages<'_> {
     }
 }
 
-/// Records a wave's way to the film, with what light subpaths show the camera.
+/// Records a wave's way to the film, with what light subpaths show the camera, of which the wave's first sample is that of the pass.
 ///
 /// # Errors
 /// Those of recording.
@@ -369,20 +383,20 @@ pub(super) fn record_resolve(
     memory: &EyeMemory,
     buffers: &WaveBuffers,
     film: &GpuFilm,
-    lights: Option<&LightPaths>,
+    lights: Option<(&LightPaths, u32)>,
     wave: &EyeWave,
 ) -> Result<()> {
     let walks = buffers.set(0);
-    if let Some(lights) = lights {
-        lights.record_add(recorder, &walks, wave.first_pixel, wave.pixels)?;
+    if let Some((lights, of_pass)) = lights {
+        lights.record_add(recorder, &walks, wave, of_pass)?;
     }
     let band = &film.bands()[wave.band];
     let push = path_resolve::Push {
         first_film_pixel: wave.first_pixel - band.first_pixel(),
         pixel_count: wave.pixels,
-        sample_count: 1,
+        sample_count: wave.samples,
         first_sample: 0,
-        slot_count: wave.pixels,
+        slot_count: wave.paths(),
         first_slot: 0,
     };
     recorder.pass("bidirectional: resolve", |pass| {

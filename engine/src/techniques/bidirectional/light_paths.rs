@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use super::eye::EyeWave;
 use super::kernels::{Counters, Counts, check_sweeps, quota_of, rays_of_submission, set_of, work};
 use super::settings::BidirectionalSettings;
 use crate::gpu::ash::vk;
@@ -85,7 +86,10 @@ struct Kit {
     counts: Counts,
     vertices: TexelView,
     capacity: u32,
+    /// Of a pass.
     walks: u32,
+    /// Of each group: light subpaths for one sample of all pixels.
+    group: u32,
     seed: u32,
     last_bounce: u32,
 }
@@ -136,7 +140,9 @@ impl LightPaths {
             sampler_kind: settings.sampler as u32,
             ..Default::default()
         });
-        let walks = settings.light_paths_of(size[0] * size[1]).min(slots_of_device(gpu));
+        let [samples, group] = settings.pass_of(size[0] * size[1]);
+        let group = group.min(slots_of_device(gpu) / samples);
+        let walks = samples * group;
         let slots = walks.next_multiple_of(WALK_GROUP).min(slots_of_device(gpu));
         let needs = WaveNeeds {
             waiting: true,
@@ -166,6 +172,7 @@ impl LightPaths {
                 capacity,
                 scene: Arc::clone(scene),
                 walks,
+                group,
                 seed: settings.seed,
                 last_bounce: settings.walk_bounces(),
             },
@@ -176,15 +183,15 @@ impl LightPaths {
             rays_at_once: rays_of_submission(gpu),
             counts: LightCounts::default(),
         };
-        if settings.strategies.splats() && fits(gpu, size) {
+        if settings.strategies.splats() && fits(gpu, size, samples) {
             paths.camera = Some(Shown::new(gpu, scene, frame, size, settings, capacity)?);
         }
         Ok(paths)
     }
 
-    /// Light subpaths of a pass.
-    pub fn walks(&self) -> u32 {
-        self.kit.walks
+    /// Light subpaths of a pass, and for each of its samples.
+    pub fn walks(&self) -> [u32; 2] {
+        [self.kit.walks, self.kit.group]
     }
 
     /// Whether they meet the camera.
@@ -373,18 +380,31 @@ impl LightPaths {
         recorder.submit()?.wait()
     }
 
-    /// Records what adds to the eye paths of a wave, a sample each of consecutive pixels, what the camera is shown of the pass.
+    /// Records what adds to the eye paths of a wave what the camera is shown of the pass. Of the pass, their first sample is `first_sample`.
     ///
     /// # Errors
     /// Those of recording.
-    pub fn record_add(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, first_pixel: u32, count: u32) -> Result<()> {
+    pub fn record_add(
+        &self,
+        recorder: &mut Recorder,
+        walks: &WaveSet<'_>,
+        wave: &EyeWave,
+        first_sample: u32,
+    ) -> Result<()> {
         let Some(camera) = &self.camera else {
             return Ok(());
         };
         let set = camera.set(&self.kit);
         recorder.pass("light subpaths: add", |pass| {
-            let push = bdpt_add::Push { first_pixel, count };
-            pass.dispatch(&camera.add, &[wave, &set], &push, [camera.add.groups_for(count), 1, 1])?;
+            let push = bdpt_add::Push {
+                first_pixel: wave.first_pixel,
+                count: wave.paths(),
+                samples: wave.samples,
+                first_sample,
+                pixels: camera.size[0] * camera.size[1],
+            };
+            let groups = [camera.add.groups_for(push.count), 1, 1];
+            pass.dispatch(&camera.add, &[walks, &set], &push, groups)?;
             stage_barrier(pass);
             Ok(())
         })
@@ -400,12 +420,18 @@ impl Shown {
         settings: &BidirectionalSettings,
         capacity: u32,
     ) -> Result<Self> {
+        let pixels = size[0] * size[1];
         Ok(Self {
             pipeline: camera_pipeline(gpu, scene, frame, settings)?,
             splat: gpu.compute_pipeline(&Default::default())?,
             add: gpu.compute_pipeline(&Default::default())?,
             splats: splats(gpu, capacity)?,
-            sums: work(gpu, "splat sums", size_of::<SplatSum>(), size[0] * size[1])?,
+            sums: work(
+                gpu,
+                "splat sums",
+                size_of::<SplatSum>(),
+                pixels * settings.pass_of(pixels)[0],
+            )?,
             frame: *frame,
             size,
             bounces: settings.bounces(),
@@ -438,7 +464,7 @@ impl Shown {
             scene_upper: upper.to_array(),
             most_bounces: self.bounces[1],
             pass,
-            walks: kit.walks,
+            walks: kit.group,
             seed: kit.seed,
             first,
             end,
@@ -505,6 +531,7 @@ impl WalkStages for LightStages<'_> {
             scene_lower: lower.to_array(),
             last_bounce: kit.last_bounce,
             scene_upper: upper.to_array(),
+            group: kit.group,
             key: self.key,
         };
         recorder.pass("light subpaths: scatter", |pass| {
@@ -545,8 +572,9 @@ fn splats(gpu: &Gpu, vertices: u32) -> Result<Buffer> {
     work(gpu, "light splats", size_of::<LightSplat>(), vertices)
 }
 
-/// Whether the sums of a picture fit into one buffer.
-fn fits(gpu: &Gpu, [width, height]: [u32; 2]) -> bool {
-    let bytes = u64::from(width) * u64::from(height) * size_of::<SplatSum>() as u64;
+/// Whether the sums of a picture, so many for each pixel, fit into one buffer.
+fn fits(gpu: &Gpu, [width, height]: [u32; 2], samples: u32) -> bool {
+    let sums = u64::from(width) * u64::from(height) * u64::from(samples);
+    let bytes = sums * size_of::<SplatSum>() as u64;
     bytes <= gpu.caps().max_storage_buffer_range
 }

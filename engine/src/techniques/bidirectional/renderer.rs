@@ -1,4 +1,4 @@
-//! A progressive rendering by bidirectional path tracing: pass after pass, light subpaths of their own for each, and one eye path a pixel, joined to them.
+//! A progressive rendering by bidirectional path tracing: pass after pass, light subpaths of their own for each, and some eye paths a pixel, joined to them.
 //!
 //! Sources: E. Lafortune, Y. Willems, "Bi-directional Path Tracing", 1993; E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", PhD thesis, 1997, chapters 9
 //! and 10; I. Georgiev, "Implementing Vertex Connection and Merging", 2012, for the partial weights; T. Davidovič, J. Křivánek, M. Hašan, P. Slusallek, "Progressive Light
@@ -6,8 +6,8 @@
 //! their number as weight, which has the expectation of joining it to all vertices of one light subpath.
 //!
 //! Guarantees: unbiased, since the weights of all ways to make a path sum to one, and each way that a scene leaves out has the weight zero in all others; deterministic in
-//! (seed, pass, walk) and (seed, pixel, sample), on any number of threads, since what light subpaths show the camera is summed in integers. Samples of a pixel are
-//! independent, but for sampler points; pixels share the light subpaths of a pass.
+//! (seed, pass, walk) and (seed, pixel, sample), on any number of threads, since what light subpaths show the camera is summed in integers. What light subpaths show the
+//! camera is of other walks for each sample of a pixel; samples of a pass and pixels share the vertices that eye paths are joined to.
 
 use std::sync::Arc;
 
@@ -67,6 +67,8 @@ pub struct BidirectionalPaths {
     /// None where no light subpath brings anything.
     lights: Option<LightPaths>,
     film: GpuFilm,
+    /// Samples of a pass.
+    each: u32,
     cursor: Cursor,
     in_flight: Option<InFlight>,
     counts: BidirectionalCounts,
@@ -106,6 +108,7 @@ impl BidirectionalPaths {
         let lights = has_light_paths.then(|| LightPaths::new(gpu, &scene, &frame, size, &settings));
         let lights = lights.transpose()?;
         let connects = lights.is_some() && settings.strategies.connects();
+        let [each, _] = settings.pass_of(size[0] * size[1]);
         let kernels = EyeKernels::new(gpu, &scene, &frame, &settings, connects)?;
         // Takes as much memory as is left, if it must.
         let (buffers, memory) = EyeMemory::within(gpu, &scene, size[0] * size[1], &settings)?;
@@ -126,6 +129,7 @@ impl BidirectionalPaths {
             memory,
             lights,
             film,
+            each,
             cursor: Cursor::default(),
             in_flight: None,
             counts: BidirectionalCounts::default(),
@@ -234,10 +238,10 @@ impl BidirectionalPaths {
         if let Some(lights) = &mut self.lights
             && !lights.are_ready()
         {
-            let timings = lights.advance(self.cursor.sample)?;
+            let timings = lights.advance(self.cursor.sample / self.each)?;
             return Ok(Some(self.step_so_far(timings, samples)));
         }
-        let timings = self.advance()?;
+        let timings = self.advance(samples)?;
         Ok(Some(self.step_so_far(timings, samples)))
     }
 
@@ -252,12 +256,13 @@ impl BidirectionalPaths {
     }
 
     /// One submission of eye paths, and another that brings a wave that has ended to the film.
-    fn advance(&mut self) -> Result<Vec<Timings>> {
+    fn advance(&mut self, wanted: u32) -> Result<Vec<Timings>> {
         let mut in_flight = match self.in_flight.take() {
             Some(in_flight) => in_flight,
             None => {
-                let (wave, next) = self.cursor.next_wave(&self.film, self.walker.buffers().slots());
-                let walks = self.walker.begin(wave.key(self.settings.seed), wave.pixels)?;
+                let slots = self.walker.buffers().slots();
+                let (wave, next) = self.cursor.next_wave(&self.film, slots, self.each, wanted);
+                let walks = self.walker.begin(wave.key(self.settings.seed), wave.paths())?;
                 InFlight { wave, next, walks }
             }
         };
@@ -280,7 +285,7 @@ impl BidirectionalPaths {
             return Ok(timings);
         }
         let (wave, next) = (*wave, *next);
-        self.counts.paths += u64::from(wave.pixels);
+        self.counts.paths += u64::from(wave.paths());
         self.counts.waves += 1;
         if self.lights.as_ref().is_some_and(|lights| lights.vertices().1 > 0) && self.settings.strategies.connects() {
             let counters = self.memory.counts.read()?;
@@ -289,7 +294,8 @@ impl BidirectionalPaths {
         }
         let mut recorder = self.gpu.recorder("bidirectional film")?;
         let buffers = self.walker.buffers();
-        let lights = self.lights.as_ref();
+        let of_pass = wave.first_sample % self.each;
+        let lights = self.lights.as_ref().map(|lights| (lights, of_pass));
         record_resolve(
             &mut recorder,
             &self.kernels,
@@ -300,7 +306,7 @@ impl BidirectionalPaths {
             &wave,
         )?;
         let submission = recorder.submit()?;
-        let ends_pass = next.sample > self.cursor.sample;
+        let ends_pass = next.sample > self.cursor.sample && next.sample.is_multiple_of(self.each);
         self.cursor = next;
         if let Some(lights) = &mut self.lights
             && ends_pass

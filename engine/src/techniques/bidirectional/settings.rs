@@ -11,6 +11,10 @@ use crate::{Error, Result};
 
 /// Light subpaths of a pass, at most: their vertices then stay within the buffers of the baseline even where nothing absorbs.
 pub(super) const LIGHT_PATHS_MAX: u32 = 1 << 16;
+/// Samples of a pass, at most: a wave's least slots hold some pixels of so many.
+const SAMPLES_PER_PASS_MAX: u32 = 16;
+/// And as many as are chosen: light subpaths of a pass are walked for all of its samples, whether or not a picture takes them.
+const SAMPLES_PER_PASS: u32 = 8;
 /// Scatterings that are counted at most.
 const BOUNCES_MAX: u32 = 4000;
 /// Scatterings that light subpaths are followed through at most, so that none is followed for ever between lossless surfaces.
@@ -59,8 +63,11 @@ impl Strategies {
 crate::settings! {
     /// Settings of bidirectional path tracing.
     pub struct BidirectionalSettings {
-        /// Light subpaths of a pass, in which every pixel has one sample; 0 for as many as there are pixels, up to 65536. Changes the noise only.
-        pub light_paths: u32 = 0, in 0..=LIGHT_PATHS_MAX, unit "paths per pass";
+        /// Light subpaths for each sample of all pixels; 0 for as many as there are pixels, as far as a pass has room. Changes the noise only.
+        pub light_paths: u32 = 0, in 0..=LIGHT_PATHS_MAX, unit "paths per sample";
+        /// Samples of each pixel in a pass, whose eye paths are joined to the light subpaths of all of them: small pictures fill the device so. 0 for as many as make 65536
+        /// paths, up to 8. Changes the noise only.
+        pub samples_per_pass: u32 = 0, in 0..=SAMPLES_PER_PASS_MAX, unit "samples";
         /// Vertices of light subpaths that each vertex of an eye path is joined to, drawn evenly from all of the pass; changes the noise only.
         pub connections: u32 = 1, in 1..=16, unit "connections";
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
@@ -87,11 +94,18 @@ crate::settings! {
         /// Eye paths under way together, at most; 0 chooses by the kind of device. Never changes the picture.
         pub paths_in_flight: u32 = 0;
     }
-    check BidirectionalSettings::has_a_range;
+    check BidirectionalSettings::fits_together;
 }
 
 impl BidirectionalSettings {
-    fn has_a_range(&self) -> Result<()> {
+    fn fits_together(&self) -> Result<()> {
+        if self.light_paths.saturating_mul(self.samples_per_pass) > LIGHT_PATHS_MAX {
+            let cause = format!(
+                "for each of {} samples_per_pass are more than the {LIGHT_PATHS_MAX} light subpaths that a pass has room for",
+                self.samples_per_pass
+            );
+            return Err(Error::setting("light_paths", self.light_paths, cause));
+        }
         self.path_set().map(|_| ())
     }
 
@@ -111,12 +125,18 @@ impl BidirectionalSettings {
         self.most_bounces != Some(0) && (self.strategies.connects() || self.strategies.splats())
     }
 
-    /// Light subpaths of a pass of so many pixels.
-    pub(super) fn light_paths_of(&self, pixels: u32) -> u32 {
-        match self.light_paths {
-            0 => pixels.clamp(1, LIGHT_PATHS_MAX),
+    /// Samples of a pass of a picture of so many pixels, and light subpaths for each of them.
+    pub(super) fn pass_of(&self, pixels: u32) -> [u32; 2] {
+        let pixels = pixels.clamp(1, LIGHT_PATHS_MAX);
+        let samples = match self.samples_per_pass {
+            0 => (LIGHT_PATHS_MAX / pixels.max(self.light_paths)).clamp(1, SAMPLES_PER_PASS),
             wanted => wanted,
-        }
+        };
+        let paths = match self.light_paths {
+            0 => pixels.min(LIGHT_PATHS_MAX / samples),
+            wanted => wanted,
+        };
+        [samples, paths]
     }
 
     /// The light paths of the picture.
@@ -165,16 +185,23 @@ mod tests {
     }
 
     #[test]
-    fn a_pass_has_a_light_subpath_a_pixel_up_to_what_buffers_hold() {
-        let settings = BidirectionalSettings::default();
-        assert_eq!(
-            [1, 640, 1 << 20].map(|pixels| settings.light_paths_of(pixels)),
-            [1, 640, 1 << 16]
-        );
-        let few = BidirectionalSettings {
-            light_paths: 3,
-            ..settings
+    fn a_pass_has_a_light_subpath_a_pixel_and_sample_up_to_what_buffers_hold() {
+        let of = |light_paths, samples_per_pass| BidirectionalSettings {
+            light_paths,
+            samples_per_pass,
+            ..BidirectionalSettings::default()
         };
-        assert_eq!(few.light_paths_of(640), 3);
+        for (settings, pixels, expected) in [
+            (of(0, 0), 1, [8, 1]),
+            (of(0, 0), 128 * 128, [4, 128 * 128]),
+            (of(0, 0), 1 << 20, [1, 1 << 16]),
+            (of(3, 0), 640, [8, 3]),
+            (of(1 << 14, 0), 640, [4, 1 << 14]),
+            (of(0, 2), 1 << 20, [2, 1 << 15]),
+        ] {
+            settings.check().unwrap();
+            assert_eq!(settings.pass_of(pixels), expected, "{settings:?}");
+        }
+        assert!(of(1 << 15, 4).check().unwrap_err().to_string().contains("light_paths"));
     }
 }
