@@ -79,6 +79,22 @@ vec4 environment_look_up(uvec2 size, float left_out, vec3 w) {
     return vec4(environment_interpolated(corners, within), corners[2].a * mix(sides.x, sides.y, within.x));
 }
 
+// Density of environment_sample in a direction, by the tables of emission that begin at `base`, sr^-1.
+float environment_emission_pdf(uint base, uvec2 size, vec3 w) {
+    vec2 within;
+    uvec2 cell = environment_cell(environment_uv(w), size, within);
+    bool south;
+    vec2 rims = environment_rims(cell.y, size.y, south);
+    float rim = 0.5 * dot(w.xz, w.xz) / (1.0 + (south ? -w.y : w.y));
+    float from_rim = clamp((rim - rims.x) / (rims.y - rims.x), 0.0, 1.0);
+    vec4 luminances = environment_luminances(environment_corners(cell, size), 0.0);
+    vec2 sides = environment_sides(luminances, south ? 1.0 - from_rim : from_rim);
+    uvec2 grid = uvec2(size.x, size.y + 1u);
+    float probability = distribution_probability(base, cell.y) * distribution_probability(distribution_row_base(base, grid, cell.y), cell.x);
+    float solid_angle = 4.0 * PI * (rims.y - rims.x) / float(size.x);
+    return probability / (dot(luminances, vec4(0.25)) * solid_angle) * mix(sides.x, sides.y, within.x);
+}
+
 // A direction that two words choose; `found` is environment_look_up there. The tables of emission, which have all of the light, are not those
 // that the densities of look-ups are of: with them the density follows from the cell's probability.
 vec3 environment_sample(uint base, uvec2 size, float left_out, bool emission, uvec2 word, uvec2 fresh, out vec4 found) {

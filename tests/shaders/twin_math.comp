@@ -11,6 +11,7 @@ const bool SEPARABLE_MASKING = false;
 #include "accel/sphere.glsl"
 #include "accel/triangle.glsl"
 #include "film/two_float.glsl"
+#include "techniques/bidirectional/bdpt_mis.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "transport/edge_bound.glsl"
 #include "transport/fresnel.glsl"
@@ -176,6 +177,17 @@ void main() {
         uvec2 lights = interleave_lights(in_bits(6u), n * n, in_bits(7u));
         out_bits(4u, lights.x);
         out_bits(5u, lights.y);
+        break;
+    }
+    case 16u: {  // partial weights of paths from both ends
+        PartialWeights w = PartialWeights(in1(0u), in1(1u));
+        PartialWeights arrived = mis_arrive(w, in1(2u), in1(3u));
+        PartialWeights scattered = mis_scatter(w, in1(4u), in1(5u), in1(6u));
+        PartialWeights mirrored = mis_scatter_delta(w, in1(4u), in1(7u));
+        out2(0u, vec2(arrived.d_vcm, arrived.d_vc));
+        out2(2u, vec2(scattered.d_vcm, scattered.d_vc));
+        out2(4u, vec2(mirrored.d_vcm, mirrored.d_vc));
+        out2(6u, vec2(mis_behind(w, in1(6u)), mis_weight(in1(0u), in1(1u))));
         break;
     }
     }

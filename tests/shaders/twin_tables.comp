@@ -57,6 +57,11 @@ void main() {
         out3(13u, environment_direction(in2(13u)));
         break;
     }
+    case 4u: {  // densities of the emission of environment maps
+        uvec2 size = uvec2(in_bits(0u), in_bits(1u));
+        out1(0u, environment_emission_pdf(4u * size.x * (size.y + 1u), size, in3(10u)));
+        break;
+    }
     case 3u: {  // numbers that are used again, linear densities
         float u = in1(0u);
         out1(0u, choose_first(u, in1(1u)) ? 1.0 : 0.0);

@@ -39,6 +39,7 @@ methods! {
     ambient,
     instant_radiosity,
     + instant_radiosity::MANY_LIGHT,
+    bidirectional,
 }
 
 use std::collections::BTreeMap;

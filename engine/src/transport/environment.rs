@@ -210,6 +210,20 @@ impl EnvironmentTables {
         environment_interpolated(&corners, within).extend(pdf)
     }
 
+    /// Density of [`environment_sample`](Self::environment_sample) for emission in a direction, sr⁻¹.
+    pub fn environment_emission_pdf(&self, w: DVec3) -> f64 {
+        let (cell, within) = environment_cell(environment_uv(w), self.size);
+        let ([first, last], south) = environment_rims(cell.y, self.size.y);
+        let rim = 0.5 * (w.x * w.x + w.z * w.z) / (1.0 + if south { -w.y } else { w.y });
+        let from_rim = ((rim - first) / (last - first)).clamp(0.0, 1.0);
+        let luminances = environment_luminances(&self.environment_corners(cell), 0.0);
+        let sides = environment_sides(luminances, if south { 1.0 - from_rim } else { from_rim });
+        let cdf = self.emission_cdf.as_ref().unwrap_or(&self.cdf);
+        let probability = distribution_probability_2d(cdf, 0, self.size + UVec2::Y, cell);
+        let factor = probability / (0.25 * luminances.element_sum() * environment_cell_solid_angle(self.size, cell.y));
+        factor * (sides.x + (sides.y - sides.x) * within.x)
+    }
+
     /// A direction that two words choose, its radiance and density: for light sampling those of [`environment_look_up`](Self::environment_look_up).
     /// `fresh` are two more words, for the bits that the choice of a cell takes.
     pub fn environment_sample(&self, emission: bool, mut word: [u32; 2], fresh: [u32; 2]) -> (DVec3, DVec4) {
@@ -315,7 +329,7 @@ mod tests {
     fn samples_have_the_density_that_is_looked_up() {
         for (width, height) in [(1, 1), (2, 1), (5, 3), (16, 8), (7, 64)] {
             let tables = EnvironmentTables::build(&map(width, height), height == 8).unwrap();
-            let mut equal = 0;
+            let (mut equal, mut equal_emitted) = (0, 0);
             for i in 0..2000 {
                 let [word, fresh] = words(i);
                 let (w, found) = tables.environment_sample(false, word, fresh);
@@ -328,8 +342,11 @@ mod tests {
                 let largest = found.truncate().max_element();
                 assert!((found - seen).truncate().abs().max_element() <= 1e-9 * largest + 1e-12);
                 equal += u32::from((seen.w / found.w - 1.0).abs() < 1e-9);
+                let (w, emitted) = tables.environment_sample(true, word, fresh);
+                equal_emitted += u32::from((tables.environment_emission_pdf(w) / emitted.w - 1.0).abs() < 1e-9);
             }
             assert!(equal >= 1998, "{width} × {height}: {equal}");
+            assert!(equal_emitted >= 1998, "{width} × {height}: {equal_emitted}");
             let sphere: f64 = (0..=height)
                 .map(|row| f64::from(width) * environment_cell_solid_angle(UVec2::new(width, height), row))
                 .sum();

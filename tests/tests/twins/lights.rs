@@ -2,6 +2,7 @@
 
 use clerestory::gpu::shaders::constants::{PHASE_HENYEY_GREENSTEIN, PHASE_RAYLEIGH, PHASE_SCHLICK};
 use clerestory::scene::Phase;
+use clerestory::techniques::bidirectional::mis::{PartialWeights, mis_weight};
 use clerestory::transport::lights::{
     area_to_solid_angle, balance_heuristic, power_heuristic, spot_falloff, triangle_point,
 };
@@ -41,6 +42,28 @@ fn lights_agree_with_their_twins() {
                     power_heuristic(x[6], x[7]),
                 ],
                 triangle_point(v3(x, 8), v3(x, 11), v3(x, 14), v2(x, 17)).to_array(),
+            ]
+        });
+    });
+}
+
+#[test]
+fn partial_weights_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(15, |r| {
+            (0..8).map(|_| r.range(-20.0, 20.0).exp2()).collect::<Vec<f32>>()
+        });
+        check(gpu, "partial weights", 16, &table, ulps(8.0, 1.0, 0.0), 8, |x| {
+            let w = PartialWeights {
+                d_vcm: x[0],
+                d_vc: x[1],
+            };
+            let pair = |w: PartialWeights| [w.d_vcm, w.d_vc];
+            list![
+                pair(w.mis_arrive(x[2], x[3])),
+                pair(w.mis_scatter(x[4], x[5], x[6])),
+                pair(w.mis_scatter_delta(x[4], x[7])),
+                [w.mis_behind(x[6]), mis_weight(x[0], x[1])],
             ]
         });
     });

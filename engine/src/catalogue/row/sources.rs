@@ -36,6 +36,7 @@ sources! {
     COOK_TORRANCE_1982 = "cook-torrance-1982": "R. Cook, K. Torrance", "A Reflectance Model for Computer Graphics", "ACM TOG 1(1)", 1982;
     CORNELL_BOX_DATA = "cornell-box-data": "Cornell University Program of Computer Graphics", "Cornell Box Data", "graphics.cornell.edu/online/box/data.html", 0;
     CROW_1984 = "crow-1984": "F. Crow", "Summed-Area Tables for Texture Mapping", "SIGGRAPH", 1984;
+    DAVIDOVIC_2014 = "davidovic-2014": "T. Davidovič, J. Křivánek, M. Hašan, P. Slusallek", "Progressive Light Transport Simulation on the GPU: Survey and Improvements", "ACM TOG 33(3)", 2014;
     DEERING_1988 = "deering-1988": "M. Deering et al.", "The Triangle Processor and Normal Vector Shader", "SIGGRAPH", 1988;
     DEKKER_1971 = "dekker-1971": "T. J. Dekker", "A Floating-Point Technique for Extending the Available Precision", "Numerische Mathematik 18", 1971;
     DOMINGUES_PEDRINI_2015 = "domingues-pedrini-2015": "L. Domingues, H. Pedrini", "Bounding Volume Hierarchy Optimization through Agglomerative Treelet Restructuring", "HPG", 2015;
@@ -49,6 +50,7 @@ sources! {
     FEYNMAN_1964 = "feynman-1964": "R. Feynman, R. Leighton, M. Sands", "The Feynman Lectures on Physics", "Addison-Wesley", 1964;
     FOLEY_SUGERMAN_2005 = "foley-sugerman-2005": "T. Foley, J. Sugerman", "KD-Tree Acceleration Structures for a GPU Raytracer", "Graphics Hardware", 2005;
     GANESTAM_2015 = "ganestam-2015": "P. Ganestam, R. Barringer, M. Doggett, T. Akenine-Möller", "Bonsai: Rapid Bounding Volume Hierarchy Generation using Mini Trees", "JCGT 4(3)", 2015;
+    GEORGIEV_2012 = "georgiev-2012": "I. Georgiev", "Implementing Vertex Connection and Merging", "Technical report, Saarland University", 2012;
     GERASIMOV_2004 = "gerasimov-2004": "P. Gerasimov", "Omnidirectional Shadow Mapping", "GPU Gems", 2004;
     GORAL_1984 = "goral-1984": "C. Goral, K. Torrance, D. Greenberg, B. Battaile", "Modeling the Interaction of Light Between Diffuse Surfaces", "SIGGRAPH", 1984;
     GREENE_1986 = "greene-1986": "N. Greene", "Environment Mapping and Other Applications of World Projections", "IEEE CG&A 6(11)", 1986;
@@ -97,6 +99,7 @@ sources! {
     KULLA_CONTY_2017 = "kulla-conty-2017": "C. Kulla, A. Conty", "Revisiting Physically Based Shading at Imageworks", "SIGGRAPH course notes", 2017;
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;
     KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;
+    LAFORTUNE_WILLEMS_1993 = "lafortune-willems-1993": "E. Lafortune, Y. Willems", "Bi-directional Path Tracing", "Compugraphics", 1993;
     LAFORTUNE_WILLEMS_1994 = "lafortune-willems-1994": "E. Lafortune, Y. Willems", "Using the Modified Phong Reflectance Model for Physically Based Rendering", "Report CW 197, KU Leuven", 1994;
     LAGARDE_ZANUTTINI_2012 = "lagarde-zanuttini-2012": "S. Lagarde, A. Zanuttini", "Local Image-based Lighting with Parallax-corrected Cubemaps", "SIGGRAPH Talks", 2012;
     LAINE_2007 = "laine-2007": "S. Laine, H. Saransaari, J. Kontkanen, J. Lehtinen, T. Aila", "Incremental Instant Radiosity for Real-Time Indirect Illumination", "EGSR", 2007;

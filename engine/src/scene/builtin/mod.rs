@@ -17,6 +17,7 @@ pub mod noise;
 mod parameters;
 mod ring;
 mod rooms;
+mod shaded_lamp;
 mod shapes;
 mod slab;
 mod soup;
@@ -69,6 +70,7 @@ pub fn catalogue() -> &'static [Entry] {
         rooms::PASSAGE,
         fog::POINT_IN_FOG,
         ring::RING,
+        shaded_lamp::SHADED_LAMP,
         slab::SLAB,
         volumes::SMOKE,
         sphere_flake::SPHERE_FLAKE,

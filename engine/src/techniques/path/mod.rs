@@ -21,7 +21,7 @@ mod pipelines;
 mod record;
 mod refill;
 mod settings;
-mod unseen;
+pub(super) mod unseen;
 mod wave;
 
 use std::sync::Arc;

@@ -7,6 +7,8 @@ use crate::transport::ggx::ALPHA_MIN;
 
 /// Light that leaves its source for a mirror or glass and reaches something else that it can be seen on.
 const BEYOND_MIRRORS: &str = "LS.*[^S].*E";
+const BY_NO_EYE_PATH: &str =
+    "by way of mirrors and smooth glass, such as caustics: no path from the eye meets a light without area there";
 /// Names of lights that are spelt out.
 const NAMES: usize = 3;
 
@@ -17,13 +19,27 @@ pub(super) fn unseen_by_eye_paths(
     lights: &[Light],
     wanted: &PathSet,
 ) -> Result<Option<String>> {
+    unseen_of_lights(profile, lights, wanted, BEYOND_MIRRORS, BY_NO_EYE_PATH)
+}
+
+/// What lights without area give of the wanted paths that are among those `beyond`, where surfaces are smooth enough for some, in words that end with `how`.
+///
+/// # Errors
+/// [`Error::Setting`](crate::Error::Setting) for an expression that is none.
+pub(in crate::techniques) fn unseen_of_lights(
+    profile: &SceneProfile,
+    lights: &[Light],
+    wanted: &PathSet,
+    beyond: &str,
+    how: &str,
+) -> Result<Option<String>> {
     let smooth = profile
         .roughness
         .is_some_and(|[least, _]| f64::from(least).powi(2) < ALPHA_MIN);
     if lights.is_empty() || !smooth {
         return Ok(None);
     }
-    let beyond: PathSet = BEYOND_MIRRORS.parse()?;
+    let beyond: PathSet = beyond.parse()?;
     // A set that is too large to tell has them for all that is known.
     if wanted.intersection(&beyond).is_ok_and(|both| both.is_empty()) {
         return Ok(None);
@@ -42,7 +58,7 @@ pub(super) fn unseen_by_eye_paths(
         names.push(format!("{} more", lights.len() - NAMES));
     }
     Ok(Some(format!(
-        "what {} give{} by way of mirrors and smooth glass, such as caustics: no path from the eye meets a light without area there",
+        "what {} give{} {how}",
         names.join(" and "),
         if lights.len() == 1 { "s" } else { "" }
     )))

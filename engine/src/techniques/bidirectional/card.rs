@@ -1,0 +1,230 @@
+//! Bidirectional path tracing as a technique.
+
+use std::collections::BTreeMap;
+
+use super::renderer::BidirectionalPaths;
+use super::settings::BidirectionalSettings;
+use crate::Result;
+use crate::catalogue::{Role, Row, sources};
+use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::techniques::bidirectional::{
+    bdpt_add, bdpt_append, bdpt_camera, bdpt_connect, bdpt_emit, bdpt_scatter, bdpt_shade, bdpt_splat,
+};
+use crate::gpu::shaders::techniques::path::{path_camera, path_resolve};
+use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
+use crate::gpu::{Buffer, PipelineInfo};
+use crate::scene::{Camera, SceneProfile};
+use crate::settings::{SettingsDecl, TypedSettings};
+use crate::techniques::path::unseen::unseen_of_lights;
+use crate::techniques::skipped::skipped;
+use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
+use crate::transport::{PathSet, SURFACE_FEATURES};
+
+/// The catalogue's entry.
+pub(in crate::techniques) const CARD: Card = Card {
+    id: "bdpt",
+    summary: "bidirectional path tracing: paths made from both ends in every way, weighted by the balance heuristic",
+    rows: &[ROWS],
+    bias: BIAS,
+    needs: &[],
+    kernels: &[&KERNELS],
+    path_set: PathSet::ALL,
+    refusals,
+    settings: SettingsDecl::of::<BidirectionalSettings>(),
+    variants: &[Variant::DEFAULTS],
+    foresight: Foresight {
+        misses: |profile, lights, wanted| unseen_of_lights(profile, lights, wanted, BETWEEN_MIRRORS, BY_NO_JOINT),
+        law: |_| {
+            Ok(Law {
+                // All pixels have the light subpaths of a pass.
+                shares_noise: true,
+                ..Law::INDEPENDENT
+            })
+        },
+        ..Foresight::PLAIN
+    },
+    create: |gpu, scene, view, settings| {
+        let mut settings: BidirectionalSettings = settings.read()?;
+        settings.seed = view.seed;
+        settings.aovs = view.aovs;
+        Ok(Box::new(BidirectionalPaths::new(
+            gpu,
+            scene,
+            view.camera,
+            view.size,
+            settings,
+        )?))
+    },
+};
+
+/// Light off mirrors onto surfaces that are seen in mirrors alone: nowhere two vertices follow each other that can be joined.
+const BETWEEN_MIRRORS: &str = "LS+([DG]S+)+E";
+const BY_NO_JOINT: &str = "by way of mirrors and smooth glass onto what is seen in such, like caustics behind glass: no subpaths of eye and light can be joined there";
+
+/// Why a scene cannot be modelled.
+pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
+    reasons(&[(
+        profile.media.any(),
+        "the scene has participating media, and paths are joined on surfaces only",
+    )])
+}
+
+/// What a picture may take with default settings, of whatever scene.
+const KERNELS: [&ShaderInfo; 15] = [
+    &path_camera::INFO,
+    &extend::INFO,
+    &shadow::INFO,
+    &compact_count::INFO,
+    &compact_scan::INFO,
+    &compact_scatter::INFO,
+    &path_resolve::INFO,
+    &bdpt_emit::INFO,
+    &bdpt_scatter::INFO,
+    &bdpt_append::INFO,
+    &bdpt_camera::INFO,
+    &bdpt_splat::INFO,
+    &bdpt_add::INFO,
+    &bdpt_connect::INFO,
+    &bdpt_shade::INFO,
+];
+
+impl Technique for BidirectionalPaths {
+    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        BidirectionalPaths::step(self, samples)
+    }
+
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        BidirectionalPaths::picture(self)
+    }
+
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        BidirectionalPaths::display(self, target, exposure, format)
+    }
+
+    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        BidirectionalPaths::set_camera(self, camera)
+    }
+
+    fn path_set(&self) -> PathSet {
+        BidirectionalPaths::path_set(self)
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        BidirectionalPaths::settings(self).to_json()
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        let c = self.counts();
+        BTreeMap::from([
+            ("paths", c.paths),
+            ("extend_rays", c.extend_rays),
+            ("shadow_rays", c.shadow_rays),
+            ("light_rays", c.light_rays),
+            ("rays", c.extend_rays + c.shadow_rays + c.light_rays),
+            ("waves", c.waves),
+            ("stalls", c.stalls),
+            ("postponed", c.postponed),
+            ("light_paths", c.light_paths),
+            ("light_vertices", c.light_vertices),
+            ("vertices_in_view", c.vertices_in_view),
+            ("connections", c.connections),
+        ])
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        BidirectionalPaths::pipelines(self)
+    }
+
+    fn skipped(&self) -> Vec<Skipped> {
+        let pipelines = BidirectionalPaths::pipelines(self);
+        let mut skipped = skipped(&pipelines, bdpt_shade::INFO.name, &SURFACE_FEATURES);
+        if !self.has_light_paths() {
+            skipped.push(Skipped {
+                what: "light subpaths",
+                why: "no light can be chosen, or the picture has nothing of theirs",
+            });
+        } else if !self.meets_the_camera() {
+            skipped.push(Skipped {
+                what: "light subpaths that meet the camera",
+                why: "the picture's sums are larger than a buffer of the device",
+            });
+        }
+        skipped
+    }
+}
+
+const BIAS: Bias = Bias::Unbiased;
+
+/// Rows of the catalogue.
+const ROWS: &[Row] = &[
+    Row {
+        id: "CL-BDPT",
+        name: "technique `bdpt`: bidirectional path tracing on surfaces, all ways to make a path weighted by the balance heuristic",
+        role: Role::Technique,
+        limits: "Refuses scenes with media; chooses among many lights by power alone; mirrors are joined to nothing, so that light seen in a mirror by way of another from a lamp without area is not found; each sample has light subpaths of its own, which costs where light arrives directly.",
+        sources: &[
+            sources::LAFORTUNE_WILLEMS_1993.whole(),
+            sources::VEACH_1997.at("chapters 9 and 10"),
+            sources::GEORGIEV_2012.whole(),
+            sources::DAVIDOVIC_2014.at("§4: a cache of light vertices"),
+        ],
+        shaders: &["shaders/techniques/bidirectional/", "shaders/walk/"],
+        path_set: Some("all"),
+        bias: Some(BIAS),
+        tests: &[
+            "engine/src/techniques/bidirectional/mis.rs::weights_are_those_of_the_balance_heuristic_and_sum_to_one",
+            "tests/tests/twins/lights.rs::partial_weights_agree_with_their_twins",
+            "tests/tests/bidirectional/agreement.rs::lamps_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/agreement.rs::lights_without_area_and_skies_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/strategies.rs::each_way_to_make_a_path_finds_the_same_light",
+            "tests/tests/bidirectional/edge_cases.rs::pictures_do_not_depend_on_how_the_work_is_cut_up",
+            "tests/tests/bidirectional/edge_cases.rs::threads_of_the_driver_never_show",
+            "tests/tests/bidirectional/edge_cases.rs::what_cannot_be_modelled_is_refused_by_name",
+        ],
+        api: &["clerestory::techniques::bidirectional::BidirectionalPaths"],
+        settings: &[
+            "clerestory::techniques::bidirectional::BidirectionalSettings",
+            "clerestory render --technique bdpt",
+        ],
+        ..Row::of("engine/src/techniques/bidirectional/renderer.rs")
+    },
+    Row {
+        id: "CL-LIGHT-SPLATS",
+        name: "light subpaths that meet the camera, summed by integers: the same bits in whatever order",
+        role: Role::PartOf("CL-BDPT"),
+        limits: "Steps are 2⁻⁴⁰ of the greatest contribution of a pass; not for pictures whose sums, 24 bytes a pixel, pass a buffer of the device.",
+        sources: &[sources::VEACH_1997.at("10.3.2")],
+        shaders: &[
+            "shaders/techniques/bidirectional/bdpt_camera.comp",
+            "shaders/techniques/bidirectional/bdpt_splat.comp",
+            "shaders/techniques/bidirectional/bdpt_add.comp",
+        ],
+        tests: &[
+            "tests/tests/bidirectional/strategies.rs::light_subpaths_meet_cameras_of_all_kinds",
+            "tests/tests/bidirectional/edge_cases.rs::threads_of_the_driver_never_show",
+        ],
+        ..Row::of("engine/src/techniques/bidirectional/light_paths.rs")
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene;
+
+    #[test]
+    fn caustics_behind_glass_are_said_to_be_missed_and_those_in_view_are_not() {
+        let missed = |address: &str, wanted: &str| {
+            let scene = scene::load(address).unwrap();
+            let profile = SceneProfile::of(&scene);
+            (CARD.foresight.misses)(&profile, &scene.lights, &wanted.parse().unwrap()).unwrap()
+        };
+        let glass = "builtin:cornell-box?sphere=glass&source=point";
+        assert!(missed(glass, "all").expect("missed").contains("point light"));
+        assert_eq!(missed(glass, "LS+DE"), None);
+        assert_eq!(missed("builtin:cornell-box?sphere=glass", "all"), None);
+    }
+}

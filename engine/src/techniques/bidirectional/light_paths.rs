@@ -1,0 +1,580 @@
+//! Light subpaths of a pass: walks from the lights in one wave, the vertices that they leave, and what these show the camera.
+//!
+//! Guarantees: vertices depend on (seed, pass, walk) alone, and have the order of bounces and walks; vertices that do not fit are never lost silently, since the
+//! pass is walked again with room for them; what the camera is shown is summed in integers, so that it is the same bits in whatever order; a submission is a bounded piece of work.
+
+use std::sync::Arc;
+
+use super::eye::EyeWave;
+use super::kernels::{Counters, Counts, check_sweeps, quota_of, rays_of_submission, set_of, work};
+use super::settings::BidirectionalSettings;
+use crate::gpu::ash::vk;
+use crate::gpu::interface::BindingSet;
+use crate::gpu::shaders::constants::{LIGHT_VERTEX_QUARTERS, WALK_GROUP};
+use crate::gpu::shaders::sets::{BidirectionalSet, WaveSet};
+use crate::gpu::shaders::techniques::bidirectional::{
+    bdpt_add, bdpt_append, bdpt_camera, bdpt_emit, bdpt_scatter, bdpt_splat,
+};
+use crate::gpu::shaders::types::{LightSplat, PartialWeights, SplatSum};
+use crate::gpu::{
+    Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
+};
+use crate::scene::camera_frame::CameraFrame;
+use crate::transport::{GpuScene, surface_spec};
+use crate::walk::{
+    Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds, slots_of_device,
+    stage_barrier,
+};
+use crate::{Error, Result};
+
+/// Bounces recorded into one command buffer, at most.
+const BOUNCES_PER_SUBMISSION: usize = 8;
+/// Vertices that there is room for at first, a walk.
+const VERTICES_PER_WALK: u32 = 6;
+/// Tells the random numbers of light subpaths from those of eye paths.
+const LIGHT_SEED: u32 = 0x6c69_6768;
+/// Sums are the same bits for up to as many splats.
+const SPLATS_MAX: u64 = 1 << 22;
+
+/// Light subpaths of a pass, as far as they are.
+enum Phase {
+    /// Before the first submission.
+    Before,
+    Walking(WaveInFlight),
+    /// So many of the vertices have been shown to the camera, and rays of those before were stopped `sweeps` times.
+    Showing {
+        shown: u32,
+        sweeps: u64,
+    },
+    Ready,
+}
+
+/// Exact counts.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct LightCounts {
+    pub walks: u64,
+    pub rays: u64,
+    pub vertices: u64,
+    /// Vertices that the camera might see.
+    pub in_view: u64,
+    pub shadow_rays: u64,
+    pub stalls: u64,
+    pub postponed: u64,
+}
+
+/// Walks light subpaths, pass by pass.
+pub(super) struct LightPaths {
+    gpu: Gpu,
+    walker: Walker,
+    kit: Kit,
+    camera: Option<Shown>,
+    phase: Phase,
+    vertices: u32,
+    rays_at_once: u32,
+    counts: LightCounts,
+}
+
+/// All of it but its walker.
+struct Kit {
+    scene: Arc<GpuScene>,
+    emit: ComputePipeline<bdpt_emit::Kernel>,
+    scatter: ComputePipeline<bdpt_scatter::Kernel>,
+    append: ComputePipeline<bdpt_append::Kernel>,
+    /// [`GpuScene::emission_choice`].
+    emission: Option<TexelView>,
+    weights: Buffer,
+    counts: Counts,
+    vertices: TexelView,
+    capacity: u32,
+    /// Of a pass.
+    walks: u32,
+    /// Of each group: light subpaths for one sample of all pixels.
+    group: u32,
+    seed: u32,
+    last_bounce: u32,
+}
+
+/// What the camera is shown.
+struct Shown {
+    pipeline: ComputePipeline<bdpt_camera::Kernel>,
+    splat: ComputePipeline<bdpt_splat::Kernel>,
+    add: ComputePipeline<bdpt_add::Kernel>,
+    splats: Buffer,
+    sums: Buffer,
+    frame: CameraFrame,
+    size: [u32; 2],
+    bounces: [u32; 2],
+}
+
+struct LightStages<'a> {
+    kit: &'a Kit,
+    key: WalkKey,
+}
+
+impl LightPaths {
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Arc<GpuScene>,
+        frame: &CameraFrame,
+        size: [u32; 2],
+        settings: &BidirectionalSettings,
+    ) -> Result<Self> {
+        let profile = scene.profile();
+        let emit = bdpt_emit::Spec {
+            has_textures: profile.has_textures,
+            has_vertex_colors: profile.has_vertex_colors,
+            has_shading_normals: false,
+            has_normal_maps: false,
+            has_unlit: false,
+            has_instances: profile.keeps_instances,
+            has_alpha: profile.has_alpha(),
+            has_environment: profile.has_environment(),
+            has_area_lights: scene.has_area_lights(),
+            has_punctual_lights: scene.has_punctual_lights(),
+            sampler_kind: settings.sampler as u32,
+            ..Default::default()
+        };
+        let scatter = surface_spec!(bdpt_scatter, scene, {
+            has_multiple_scattering: scene.bsdf_features().multiple_scattering,
+            separable_masking: false,
+            sampler_kind: settings.sampler as u32,
+            ..Default::default()
+        });
+        let [samples, group] = settings.pass_of(size[0] * size[1]);
+        let group = group.min(slots_of_device(gpu) / samples);
+        let walks = samples * group;
+        let slots = walks.next_multiple_of(WALK_GROUP).min(slots_of_device(gpu));
+        let needs = WaveNeeds {
+            waiting: true,
+            media: false,
+            airlight: false,
+        };
+        let options = WalkOptions {
+            name: "light subpaths",
+            shadows: false,
+            bounces: BOUNCES_PER_SUBMISSION,
+            work: settings.submission_work,
+            ..WalkOptions::default()
+        };
+        let capacity = u64::from(walks) * u64::from(VERTICES_PER_WALK);
+        let capacity = capacity.min(vertices_of_device(gpu)) as u32;
+        let buffers = WaveBuffers::new(gpu, slots, needs)?;
+        let mut paths = Self {
+            walker: Walker::new(gpu, Arc::clone(scene), buffers, options)?,
+            kit: Kit {
+                emit: gpu.compute_pipeline(&emit)?,
+                scatter: gpu.compute_pipeline(&scatter)?,
+                append: gpu.compute_pipeline(&Default::default())?,
+                emission: scene.emission_choice(gpu)?,
+                weights: work(gpu, "light subpath weights", size_of::<PartialWeights>(), slots)?,
+                counts: Counts::new(gpu)?,
+                vertices: vertex_texels(gpu, capacity)?,
+                capacity,
+                scene: Arc::clone(scene),
+                walks,
+                group,
+                seed: settings.seed,
+                last_bounce: settings.walk_bounces(),
+            },
+            gpu: gpu.clone(),
+            camera: None,
+            phase: Phase::Before,
+            vertices: 0,
+            rays_at_once: rays_of_submission(gpu),
+            counts: LightCounts::default(),
+        };
+        if settings.strategies.splats() && fits(gpu, size, samples) {
+            paths.camera = Some(Shown::new(gpu, scene, frame, size, settings, capacity)?);
+        }
+        Ok(paths)
+    }
+
+    /// Light subpaths of a pass, and for each of its samples.
+    pub fn walks(&self) -> [u32; 2] {
+        [self.kit.walks, self.kit.group]
+    }
+
+    /// Whether they meet the camera.
+    pub fn meet_the_camera(&self) -> bool {
+        self.camera.is_some()
+    }
+
+    /// The vertices of the pass, and how many there are.
+    pub fn vertices(&self) -> (&TexelView, u32) {
+        (&self.kit.vertices, self.vertices)
+    }
+
+    /// Whether all of the pass is there.
+    pub fn are_ready(&self) -> bool {
+        matches!(self.phase, Phase::Ready)
+    }
+
+    /// What is there is given up: the next submission begins a pass.
+    pub fn begin(&mut self) {
+        self.phase = Phase::Before;
+        self.vertices = 0;
+    }
+
+    /// Goes on with another seed.
+    pub fn set_seed(&mut self, seed: u32) {
+        self.kit.seed = seed;
+    }
+
+    /// Looks through another camera.
+    pub fn set_camera(&mut self, frame: &CameraFrame, settings: &BidirectionalSettings) -> Result<()> {
+        if let Some(camera) = &mut self.camera {
+            camera.pipeline = camera_pipeline(&self.gpu, &self.kit.scene, frame, settings)?;
+            camera.frame = *frame;
+        }
+        Ok(())
+    }
+
+    pub fn counts(&self) -> LightCounts {
+        self.counts
+    }
+
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let kit = &self.kit;
+        let mut all = vec![kit.emit.info(), kit.scatter.info(), kit.append.info()];
+        all.extend(self.walker.trace_pipelines());
+        if let Some(camera) = &self.camera {
+            all.extend([camera.pipeline.info(), camera.splat.info(), camera.add.info()]);
+        }
+        all
+    }
+
+    /// One submission towards the light subpaths of a pass, a bounded piece of work.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] for more vertices than a buffer holds, or rays that never end.
+    pub fn advance(&mut self, pass: u32) -> Result<Vec<Timings>> {
+        let phase = std::mem::replace(&mut self.phase, Phase::Before);
+        match phase {
+            Phase::Before => {
+                let wave = self.walker.begin(self.key(pass), self.kit.walks)?;
+                self.walk(pass, wave)
+            }
+            Phase::Walking(wave) => self.walk(pass, wave),
+            Phase::Showing { shown, sweeps } => self.show(pass, shown, sweeps),
+            Phase::Ready => {
+                self.phase = Phase::Ready;
+                Ok(Vec::new())
+            }
+        }
+    }
+
+    fn key(&self, pass: u32) -> WalkKey {
+        WalkKey {
+            first_sequence: pass,
+            first_index: 0,
+            indices: self.kit.walks,
+            seed: self.kit.seed ^ LIGHT_SEED,
+        }
+    }
+
+    fn walk(&mut self, pass: u32, mut wave: WaveInFlight) -> Result<Vec<Timings>> {
+        let mut stages = LightStages {
+            kit: &self.kit,
+            key: self.key(pass),
+        };
+        self.walker.advance(&mut wave, &mut stages)?;
+        let timings = wave.take_timings();
+        if !wave.has_ended() {
+            self.phase = Phase::Walking(wave);
+            return Ok(timings);
+        }
+        let walked = wave.walked();
+        let (needed, most) = (walked.waited, vertices_of_device(&self.gpu));
+        if needed > most {
+            return Err(Error::Overflow {
+                kernel: "bdpt_append".into(),
+                what: "vertices of light subpaths".into(),
+                needed,
+                capacity: most,
+                instead: "let a pass have fewer light_paths".into(),
+            });
+        }
+        self.counts.rays += walked.rays;
+        self.counts.stalls += walked.stalls;
+        self.counts.postponed += walked.postponed;
+        if needed > u64::from(self.kit.capacity) {
+            // The pass is walked again, with room for all.
+            let capacity = (needed + needed / 4).min(most) as u32;
+            self.kit.vertices = vertex_texels(&self.gpu, capacity)?;
+            self.kit.capacity = capacity;
+            if let Some(camera) = &mut self.camera {
+                camera.splats = splats(&self.gpu, capacity)?;
+            }
+            return Ok(timings);
+        }
+        self.vertices = needed as u32;
+        self.counts.walks += u64::from(self.kit.walks);
+        self.counts.vertices += needed;
+        self.phase = match self.camera {
+            Some(_) => Phase::Showing { shown: 0, sweeps: 0 },
+            None => Phase::Ready,
+        };
+        Ok(timings)
+    }
+
+    /// Shows some vertices more to the camera, or goes on with those whose rays were stopped; the last submission of them also sums.
+    fn show(&mut self, pass: u32, shown: u32, sweeps: u64) -> Result<Vec<Timings>> {
+        let Some(camera) = &self.camera else {
+            self.phase = Phase::Ready;
+            return Ok(Vec::new());
+        };
+        let end = shown.saturating_add(self.rays_at_once).min(self.vertices);
+        let push = camera.push(&self.kit, pass, [shown, end], sweeps > 0);
+        let (set, scene) = (camera.set(&self.kit), &self.kit.scene);
+        let mut recorder = self.gpu.recorder("bidirectional splats")?;
+        recorder.pass("light subpaths: to the camera", |p| {
+            if shown == 0 && sweeps == 0 {
+                p.fill(camera.sums.view(), 0)?;
+                p.fill(self.kit.counts.device.view(), 0)?;
+            } else {
+                let offset = std::mem::offset_of!(Counters, remaining) as u64;
+                p.fill(self.kit.counts.device.slice(offset, size_of::<u32>() as u64), 0)?;
+            }
+            p.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+            if end > shown {
+                let (index, scene) = (scene.index_set(), scene.scene_set());
+                let groups = [camera.pipeline.groups_for(end - shown), 1, 1];
+                p.dispatch(&camera.pipeline, &[&index, &scene, &set], &push, groups)?;
+            }
+            p.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
+            p.copy(self.kit.counts.device.view(), self.kit.counts.readback.view())
+        })?;
+        let mut timings = vec![recorder.submit()?.wait()?];
+        let counters = self.kit.counts.read()?;
+        if counters.remaining > 0 {
+            check_sweeps("bdpt_camera", sweeps + 1)?;
+            self.phase = Phase::Showing {
+                shown,
+                sweeps: sweeps + 1,
+            };
+            return Ok(timings);
+        }
+        if end < self.vertices {
+            self.phase = Phase::Showing { shown: end, sweeps: 0 };
+            return Ok(timings);
+        }
+        self.counts.in_view += wide_counter(counters.connections);
+        self.counts.shadow_rays += wide_counter(counters.shadow_rays);
+        if self.vertices > 0 {
+            timings.push(self.sum(camera)?);
+        }
+        self.phase = Phase::Ready;
+        Ok(timings)
+    }
+
+    fn sum(&self, camera: &Shown) -> Result<Timings> {
+        let set = camera.set(&self.kit);
+        let mut recorder = self.gpu.recorder("bidirectional splats")?;
+        recorder.pass("light subpaths: sum", |pass| {
+            let push = bdpt_splat::Push { count: self.vertices };
+            let groups = [camera.splat.groups_for(self.vertices), 1, 1];
+            pass.dispatch(&camera.splat, &[&set], &push, groups)?;
+            stage_barrier(pass);
+            Ok(())
+        })?;
+        recorder.submit()?.wait()
+    }
+
+    /// Records what adds to the eye paths of a wave what the camera is shown of the pass. Of the pass, their first sample is `first_sample`.
+    ///
+    /// # Errors
+    /// Those of recording.
+    pub fn record_add(
+        &self,
+        recorder: &mut Recorder,
+        walks: &WaveSet<'_>,
+        wave: &EyeWave,
+        first_sample: u32,
+    ) -> Result<()> {
+        let Some(camera) = &self.camera else {
+            return Ok(());
+        };
+        let set = camera.set(&self.kit);
+        recorder.pass("light subpaths: add", |pass| {
+            let push = bdpt_add::Push {
+                first_pixel: wave.first_pixel,
+                count: wave.paths(),
+                samples: wave.samples,
+                first_sample,
+                pixels: camera.size[0] * camera.size[1],
+            };
+            let groups = [camera.add.groups_for(push.count), 1, 1];
+            pass.dispatch(&camera.add, &[walks, &set], &push, groups)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+}
+
+impl Shown {
+    fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        frame: &CameraFrame,
+        size: [u32; 2],
+        settings: &BidirectionalSettings,
+        capacity: u32,
+    ) -> Result<Self> {
+        let pixels = size[0] * size[1];
+        Ok(Self {
+            pipeline: camera_pipeline(gpu, scene, frame, settings)?,
+            splat: gpu.compute_pipeline(&Default::default())?,
+            add: gpu.compute_pipeline(&Default::default())?,
+            splats: splats(gpu, capacity)?,
+            sums: work(
+                gpu,
+                "splat sums",
+                size_of::<SplatSum>(),
+                pixels * settings.pass_of(pixels)[0],
+            )?,
+            frame: *frame,
+            size,
+            bounces: settings.bounces(),
+        })
+    }
+
+    fn set<'a>(&'a self, kit: &'a Kit) -> BidirectionalSet<'a> {
+        BidirectionalSet {
+            light_splats: self.splats.view(),
+            splat_sums: self.sums.view(),
+            ..kit.set()
+        }
+    }
+
+    fn push(&self, kit: &Kit, pass: u32, [first, end]: [u32; 2], goes_on: bool) -> bdpt_camera::Push {
+        let (v, [lower, upper]) = (&self.frame, kit.scene.bounds());
+        bdpt_camera::Push {
+            origin: v.origin,
+            half_width: v.half_width,
+            right: v.right,
+            half_height: v.half_height,
+            up: v.up,
+            lens_radius: v.lens_radius,
+            forward: v.forward,
+            focus_distance: v.focus_distance,
+            width: self.size[0],
+            height: self.size[1],
+            scene_lower: lower.to_array(),
+            least_bounces: self.bounces[0],
+            scene_upper: upper.to_array(),
+            most_bounces: self.bounces[1],
+            pass,
+            walks: kit.group,
+            seed: kit.seed,
+            first,
+            end,
+            goes_on: goes_on.into(),
+        }
+    }
+}
+
+fn camera_pipeline(
+    gpu: &Gpu,
+    scene: &GpuScene,
+    frame: &CameraFrame,
+    settings: &BidirectionalSettings,
+) -> Result<ComputePipeline<bdpt_camera::Kernel>> {
+    let traversal = scene.index_traversal();
+    let spec = surface_spec!(bdpt_camera, scene, {
+        has_multiple_scattering: scene.bsdf_features().multiple_scattering,
+        separable_masking: false,
+        has_alpha: scene.profile().has_alpha(),
+        has_lens: frame.lens_radius > 0.0 && !frame.orthographic,
+        parallel_camera: frame.orthographic,
+        strategy: settings.strategies.kind(),
+        index_quota: quota_of(gpu, scene, 1)?,
+        index_kind: traversal.kind(),
+        ..Default::default()
+    });
+    traversal.pipeline(gpu, &spec)
+}
+
+impl Kit {
+    fn set(&self) -> BidirectionalSet<'_> {
+        BidirectionalSet {
+            subpath_weights: self.weights.view(),
+            bdpt_counters: self.counts.device.view(),
+            ..set_of(&self.vertices, &self.weights)
+        }
+    }
+}
+
+impl WalkStages for LightStages<'_> {
+    /// Walks leave the lights.
+    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+        let kit = self.kit;
+        let [lower, upper] = kit.scene.bounds();
+        let push = bdpt_emit::Push {
+            scene_lower: lower.to_array(),
+            radius: 0.5 * (upper - lower).length(),
+            scene_upper: upper.to_array(),
+            key: self.key,
+        };
+        recorder.pass("light subpaths: emit", |pass| {
+            let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
+            let (scene, own) = (kit.scene.emission_set(kit.emission.as_ref()), kit.set());
+            pass.dispatch(&kit.emit, &[wave, &scene, &own], &push, groups)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        let kit = self.kit;
+        let [lower, upper] = kit.scene.bounds();
+        let push = bdpt_scatter::Push {
+            scene_lower: lower.to_array(),
+            last_bounce: kit.last_bounce,
+            scene_upper: upper.to_array(),
+            group: kit.group,
+            key: self.key,
+        };
+        recorder.pass("light subpaths: scatter", |pass| {
+            let (scene, own) = (kit.scene.scene_set(), kit.set());
+            let sets: [&dyn BindingSet<'_>; 3] = [&bounce.wave, &scene, &own];
+            pass.dispatch_indirect(&kit.scatter, &sets, &push, bounce.places.items)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    /// What waits becomes vertices.
+    fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
+        let kit = self.kit;
+        recorder.pass("light subpaths: append", |pass| {
+            let push = bdpt_append::Push { capacity: kit.capacity };
+            let own = kit.set();
+            pass.dispatch_indirect(&kit.append, &[&bounce.wave, &own], &push, bounce.places.waiting)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+}
+
+/// Vertices that a buffer of the device can hold, and sums can add.
+fn vertices_of_device(gpu: &Gpu) -> u64 {
+    let caps = gpu.caps();
+    let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
+    (quarters / u64::from(LIGHT_VERTEX_QUARTERS)).min(SPLATS_MAX)
+}
+
+fn vertex_texels(gpu: &Gpu, vertices: u32) -> Result<TexelView> {
+    let texels = u64::from(vertices) * u64::from(LIGHT_VERTEX_QUARTERS);
+    gpu.storage_texels("light vertices", Category::Work, vk::Format::R32G32B32A32_UINT, texels)
+}
+
+fn splats(gpu: &Gpu, vertices: u32) -> Result<Buffer> {
+    work(gpu, "light splats", size_of::<LightSplat>(), vertices)
+}
+
+/// Whether the sums of a picture, so many for each pixel, fit into one buffer.
+fn fits(gpu: &Gpu, [width, height]: [u32; 2], samples: u32) -> bool {
+    let sums = u64::from(width) * u64::from(height) * u64::from(samples);
+    let bytes = sums * size_of::<SplatSum>() as u64;
+    bytes <= gpu.caps().max_storage_buffer_range
+}

@@ -1,0 +1,14 @@
+//! Bidirectional path tracing: paths made from both of their ends, in every way, weighted against each other.
+
+mod card;
+mod connect;
+mod eye;
+mod kernels;
+mod light_paths;
+pub mod mis;
+mod renderer;
+mod settings;
+
+pub(super) use card::CARD;
+pub use renderer::{BidirectionalCounts, BidirectionalPaths};
+pub use settings::{BidirectionalSettings, Strategies};

@@ -1,0 +1,207 @@
+//! Settings of bidirectional path tracing.
+
+use crate::gpu::shaders::constants::{
+    STRATEGY_COMBINED, STRATEGY_CONNECTIONS, STRATEGY_EMISSION, STRATEGY_LIGHT_SAMPLES, STRATEGY_SPLATS,
+};
+use crate::settings::AboveTo;
+use crate::transport::PathSet;
+use crate::transport::path_set::PATH_SET_LOBES;
+use crate::transport::random::SamplerKind;
+use crate::{Error, Result};
+
+/// Light subpaths of a pass, at most: their vertices then stay within the buffers of the baseline even where nothing absorbs.
+pub(super) const LIGHT_PATHS_MAX: u32 = 1 << 16;
+/// Samples of a pass, at most: a wave's least slots hold some pixels of so many.
+const SAMPLES_PER_PASS_MAX: u32 = 16;
+/// And as many as are chosen: light subpaths of a pass are walked for all of its samples, whether or not a picture takes them.
+const SAMPLES_PER_PASS: u32 = 8;
+/// Scatterings that are counted at most.
+const BOUNCES_MAX: u32 = 4000;
+/// Scatterings that light subpaths are followed through at most, so that none is followed for ever between lossless surfaces.
+const WALK_BOUNCES_MAX: u32 = 4096;
+
+/// Ways in which a path is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Strategies {
+    /// All, weighted by the balance heuristic.
+    #[default]
+    Combined,
+    /// Eye paths that meet the lamp, alone and in full.
+    Emission,
+    /// Eye paths that sample a light, alone and in full.
+    LightSamples,
+    /// Eye paths that are joined to light subpaths, alone, each way to join a path in full.
+    Connections,
+    /// Light subpaths that meet the camera, alone and in full.
+    Splats,
+}
+
+impl Strategies {
+    /// What kernels are specialized by.
+    pub(super) fn kind(self) -> u32 {
+        match self {
+            Self::Combined => STRATEGY_COMBINED,
+            Self::Emission => STRATEGY_EMISSION,
+            Self::LightSamples => STRATEGY_LIGHT_SAMPLES,
+            Self::Connections => STRATEGY_CONNECTIONS,
+            Self::Splats => STRATEGY_SPLATS,
+        }
+    }
+
+    /// Whether eye paths are joined to light subpaths.
+    pub(super) fn connects(self) -> bool {
+        matches!(self, Self::Combined | Self::Connections)
+    }
+
+    /// Whether light subpaths meet the camera.
+    pub(super) fn splats(self) -> bool {
+        matches!(self, Self::Combined | Self::Splats)
+    }
+}
+
+crate::settings! {
+    /// Settings of bidirectional path tracing.
+    pub struct BidirectionalSettings {
+        /// Light subpaths for each sample of all pixels; 0 for as many as there are pixels, as far as a pass has room. Changes the noise only.
+        pub light_paths: u32 = 0, in 0..=LIGHT_PATHS_MAX, unit "paths per sample";
+        /// Samples of each pixel in a pass, whose eye paths are joined to the light subpaths of all of them: small pictures fill the device so. 0 for as many as make 65536
+        /// paths, up to 8. Changes the noise only.
+        pub samples_per_pass: u32 = 0, in 0..=SAMPLES_PER_PASS_MAX, unit "samples";
+        /// Vertices of light subpaths that each vertex of an eye path is joined to, drawn evenly from all of the pass; changes the noise only.
+        pub connections: u32 = 1, in 1..=16, unit "connections";
+        /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
+        pub sampler: SamplerKind = SamplerKind::Sobol;
+        /// First bounce at which Russian roulette may end an eye path; changes the noise only.
+        pub roulette_start: u32 = 4, in 0..=4096, unit "bounces";
+        /// Greatest probability of surviving a round of roulette; changes the noise only.
+        pub roulette_cap: f32 = 0.95, in AboveTo(0.0, 0.999), unit "probability";
+    }
+    unlisted {
+        /// Which ways to make a path there are: all, or one alone, to check it; pictures then have only what it finds.
+        pub strategies: Strategies = Strategies::Combined;
+        /// Seed of the random numbers. A [`View`](crate::techniques::View) gives its own.
+        pub seed: u32 = 0;
+        /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
+        pub aovs: bool = false;
+        /// Scatterings of the light that is shown, at least.
+        pub least_bounces: u32 = 0, in 0..=BOUNCES_MAX;
+        /// And at most; `None` for any number.
+        pub most_bounces: Option<u32> = None;
+        /// Work of walks, of eye paths and of shadow rays, in loop iterations, after which a submission begins no further place, as
+        /// [`WalkOptions::work`](crate::walk::WalkOptions::work); 0 chooses by the kind of device. Never changes the picture.
+        pub submission_work: u64 = 0;
+        /// Eye paths under way together, at most; 0 chooses by the kind of device. Never changes the picture.
+        pub paths_in_flight: u32 = 0;
+    }
+    check BidirectionalSettings::fits_together;
+}
+
+impl BidirectionalSettings {
+    fn fits_together(&self) -> Result<()> {
+        if self.light_paths.saturating_mul(self.samples_per_pass) > LIGHT_PATHS_MAX {
+            let cause = format!(
+                "for each of {} samples_per_pass are more than the {LIGHT_PATHS_MAX} light subpaths that a pass has room for",
+                self.samples_per_pass
+            );
+            return Err(Error::setting("light_paths", self.light_paths, cause));
+        }
+        self.path_set().map(|_| ())
+    }
+
+    /// The least and the greatest number of scatterings.
+    pub(super) fn bounces(&self) -> [u32; 2] {
+        [self.least_bounces, self.most_bounces.unwrap_or(u32::MAX)]
+    }
+
+    /// Scatterings of light subpaths before their last vertex, at most.
+    pub(super) fn walk_bounces(&self) -> u32 {
+        self.most_bounces
+            .map_or(WALK_BOUNCES_MAX, |most| most.saturating_sub(1).min(WALK_BOUNCES_MAX))
+    }
+
+    /// Whether there are light subpaths: of one vertex at least, and something that is made of them.
+    pub(super) fn has_light_paths(&self) -> bool {
+        self.most_bounces != Some(0) && (self.strategies.connects() || self.strategies.splats())
+    }
+
+    /// Samples of a pass of a picture of so many pixels, and light subpaths for each of them.
+    pub(super) fn pass_of(&self, pixels: u32) -> [u32; 2] {
+        let pixels = pixels.clamp(1, LIGHT_PATHS_MAX);
+        let samples = match self.samples_per_pass {
+            0 => (LIGHT_PATHS_MAX / pixels.max(self.light_paths)).clamp(1, SAMPLES_PER_PASS),
+            wanted => wanted,
+        };
+        let paths = match self.light_paths {
+            0 => pixels.min(LIGHT_PATHS_MAX / samples),
+            wanted => wanted,
+        };
+        [samples, paths]
+    }
+
+    /// The light paths of the picture.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a range that is empty.
+    pub(super) fn path_set(&self) -> Result<PathSet> {
+        if self.most_bounces.is_some_and(|most| most < self.least_bounces) {
+            let cause = format!("is less than the least number of bounces, {}", self.least_bounces);
+            return Err(Error::setting("most_bounces", self.bounces()[1], cause));
+        }
+        PathSet::new(self.least_bounces, self.most_bounces, PATH_SET_LOBES)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::TypedSettings;
+
+    #[test]
+    fn ranges_of_bounces_decide_how_far_light_subpaths_go() {
+        let of = |least_bounces, most_bounces| BidirectionalSettings {
+            least_bounces,
+            most_bounces,
+            ..BidirectionalSettings::default()
+        };
+        assert_eq!(of(0, None).path_set().unwrap(), PathSet::ALL);
+        assert_eq!(
+            (of(0, None).walk_bounces(), of(0, None).has_light_paths()),
+            (4096, true)
+        );
+        // The last scattering is towards the eye.
+        assert_eq!(
+            (of(1, Some(1)).walk_bounces(), of(1, Some(1)).has_light_paths()),
+            (0, true)
+        );
+        assert_eq!(of(1, Some(3)).walk_bounces(), 2);
+        assert!(!of(0, Some(0)).has_light_paths());
+        assert!(of(3, Some(2)).check().unwrap_err().to_string().contains("most_bounces"));
+        let alone = BidirectionalSettings {
+            strategies: Strategies::LightSamples,
+            ..of(0, None)
+        };
+        assert!(!alone.has_light_paths());
+    }
+
+    #[test]
+    fn a_pass_has_a_light_subpath_a_pixel_and_sample_up_to_what_buffers_hold() {
+        let of = |light_paths, samples_per_pass| BidirectionalSettings {
+            light_paths,
+            samples_per_pass,
+            ..BidirectionalSettings::default()
+        };
+        for (settings, pixels, expected) in [
+            (of(0, 0), 1, [8, 1]),
+            (of(0, 0), 128 * 128, [4, 128 * 128]),
+            (of(0, 0), 1 << 20, [1, 1 << 16]),
+            (of(3, 0), 640, [8, 3]),
+            (of(1 << 14, 0), 640, [4, 1 << 14]),
+            (of(0, 2), 1 << 20, [2, 1 << 15]),
+        ] {
+            settings.check().unwrap();
+            assert_eq!(settings.pass_of(pixels), expected, "{settings:?}");
+        }
+        assert!(of(1 << 15, 4).check().unwrap_err().to_string().contains("light_paths"));
+    }
+}

@@ -1,0 +1,114 @@
+#version 460
+// Where light subpaths have arrived: a vertex that others may be joined to, wherever light is scattered into more than one direction, and one direction more.
+// A walk goes on with the probability that leaves its largest band as it is. What it scatters is what an eye would see (bdpt_both_ways.glsl).
+//
+// Veach 1997, 10; I. Georgiev, "Implementing Vertex Connection and Merging", 2012. Deterministic in (seed, pass, walk).
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/features.glsl"
+#include "techniques/bidirectional/bdpt_set.glsl"
+#include "walk/wave.glsl"
+#include "techniques/bidirectional/bdpt_both_ways.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint last_bounce;  // greatest number of scatterings before a vertex
+    vec3 scene_upper;
+    uint group;        // walks of one
+    WalkKey key;       // the sequence is the pass, places in it walks
+} push;
+
+#include "walk/draws.glsl"
+
+// From this bounce on no walk is sure to go on.
+const uint CAPPED_BOUNCE = 8u;
+const float SURVIVAL_MAX = 0.95;
+
+// Scatters the walk of a slot at its hit; true when it goes on.
+bool scatter(uint slot, uint place, WalkState walk, inout uint flags) {
+    Hit hit = load_hit(place);
+    if (hit.triangle == NO_HIT || walk.throughput == vec3(0.0)) {
+        return false;
+    }
+    Arrival a = arrival_at(hit, walk.direction, push.scene_lower, push.scene_upper);
+    if (arrival_is_unlit(a)) {
+        return false;
+    }
+    if (HAS_ABSORPTION) {
+        walk.throughput = absorbed(walk.throughput, arrival_interior(a, walk_gathered[slot].interior), hit.t);
+    }
+    bool from_infinity = walk.bounce == 0u && walk.pdf > 0.0;
+    PartialWeights weights = mis_arrive(subpath_weights[slot], from_infinity ? 1.0 : hit.t * hit.t, surface_cos(a, a.wo));
+    if (arrival_has_rough_lobes(a)) {
+        store_waiting(place, uvec4(floatBitsToUint(hit.barycentrics), hit.triangle, walk.bounce | (walk_index(slot) / push.group) << LIGHT_GROUP_SHIFT),
+                      floatBitsToUint(vec4(walk.throughput, weights.d_vcm)), floatBitsToUint(vec4(walk.direction, weights.d_vc)));
+        flags |= FLAG_WAITING;
+    }
+    if (walk.bounce >= push.last_bounce) {
+        return false;
+    }
+    Bsdf bsdf = a.bsdf;
+    bsdf.flags |= BSDF_IMPORTANCE;
+    ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
+    vec2 side = bounce_sample(slot, walk.bounce, DIMENSION_SIDE);
+    BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, walk.bounce, DIMENSION_DIRECTION), side.x), LOBE_ALL);
+    vec3 wi = frame_to_world(frame, scattered.wi);
+    if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi)) {
+        return false;
+    }
+    float cos_in = abs(dot(a.wo, a.surface.geometric_normal));
+    float cos_out = surface_cos(a, wi);
+    if (!(cos_in > 0.0)) {
+        return false;
+    }
+    vec3 share;
+    if (scattered.pdf > 0.0) {
+        vec4 back = scattering(a, wi, a.wo);
+        share = back.rgb * (abs(dot(wi, a.surface.geometric_normal)) / (cos_in * scattered.pdf));
+        weights = mis_scatter(weights, cos_out, scattered.pdf, back.a);
+    } else {
+        float ratio = delta_ratio(a, frame, scattered, wi);
+        if (ratio == 0.0) {
+            return false;
+        }
+        share = scattered.weight;
+        if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
+            share *= abs(frame.wo.z * dot(wi, a.surface.geometric_normal)) / (cos_in * abs(scattered.wi.z));
+        }
+        weights = mis_scatter_delta(weights, cos_out, ratio);
+    }
+    vec3 power = walk.throughput * share;
+    float most = walk.bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
+    float survival = min(largest_component(power) / largest_component(walk.throughput), most);
+    // Also ends a walk whose power is not a number.
+    if (!(side.y < survival)) {
+        return false;
+    }
+    if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
+        walk_gathered[slot].interior = frame.wo.z > 0.0 ? a.surface.material : OUTSIDE;
+    }
+    walk.throughput = power / survival;
+    walk.origin = departure(a, wi, walk.throughput);
+    walk.direction = normalize(wi);
+    walk.bounce += 1u;
+    walk.pdf = 0.0;
+    subpath_weights[slot] = weights;
+    walk_states_out[slot] = walk;
+    return true;
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled != STALLED_NOT || place >= status.active_count) {
+        return;
+    }
+    uint slot = load_slot(place);
+    uint flags = 0u;
+    if (scatter(slot, place, load_walk(slot), flags)) {
+        flags |= FLAG_ALIVE;
+    }
+    walk_flags_out[place] = flags;
+}

@@ -1,0 +1,99 @@
+// What kernels of bidirectional paths share: the vertices that walks from the lights leave, the partial weights of subpaths under way, and the picture of what
+// light subpaths show the camera.
+#ifndef CLERESTORY_TECHNIQUES_BIDIRECTIONAL_BDPT_SET_GLSL
+#define CLERESTORY_TECHNIQUES_BIDIRECTIONAL_BDPT_SET_GLSL
+
+#extension GL_EXT_samplerless_texture_functions : require
+
+#include "techniques/bidirectional/bdpt_mis.glsl"
+
+// descriptor set 3: BidirectionalSet
+
+// Ways in which a path is made: the eye path meets the lamp; it samples one; it is joined to a light subpath; a light subpath meets the camera.
+const uint STRATEGY_COMBINED = 0u;  // all, weighted
+const uint STRATEGY_EMISSION = 1u;  // and each alone, where all that it finds counts in full
+const uint STRATEGY_LIGHT_SAMPLES = 2u;
+const uint STRATEGY_CONNECTIONS = 3u;
+const uint STRATEGY_SPLATS = 4u;
+
+layout(constant_id = 50) const uint STRATEGY = STRATEGY_COMBINED;
+layout(constant_id = 51) const bool PARALLEL_CAMERA = false;  // orthographic
+
+// Quarters of a vertex: barycentric coordinates, triangle, group of its walk and scatterings before; power that arrives, W, as if its walk were the only one, and d_vcm; the way it
+// came, unit, and d_vc.
+const uint LIGHT_VERTEX_QUARTERS = 3u;
+
+// Where a walk's group lies in the word of its number of scatterings.
+const uint LIGHT_GROUP_SHIFT = 16u;
+
+// Walks of a pass are in as many groups as pixels have samples in it: what those of a group show the camera belongs to one sample of each pixel.
+struct LightVertex {
+    vec2 barycentrics;
+    uint triangle;
+    uint group;
+    uint bounce;
+    vec3 power;
+    vec3 direction;
+    PartialWeights weights;
+};
+
+// Stand for the pixel of a vertex that shows the camera nothing, and of one whose shadow ray goes on.
+const uint SPLAT_NONE = 0xFFFFFFFFu;
+const uint SPLAT_STOPPED = 0xFFFFFFFEu;
+
+struct LightSplat {
+    vec3 radiance;  // the first component holds where a ray goes on that has stopped
+    uint pixel;     // behind those of the groups before
+};
+
+// Sums of a pixel in steps of splat_step, 64 bits a band, low word first.
+struct SplatSum {
+    uint words[6];
+};
+
+// Where the connections of a place go on.
+struct ConnectionState {
+    vec3 sum;
+    uint next;    // connection
+    uint cursor;  // of its shadow ray
+};
+
+layout(set = 3, binding = 0) uniform utextureBuffer light_vertex_texels;
+layout(set = 3, binding = 1, scalar) restrict writeonly buffer LightVertices { uvec4 light_vertices[]; };
+layout(set = 3, binding = 2, scalar) restrict buffer SubpathWeights { PartialWeights subpath_weights[]; };          // by slot
+layout(set = 3, binding = 3, scalar) restrict buffer ConnectionStates { ConnectionState connection_states[]; };     // by place
+layout(set = 3, binding = 4, scalar) restrict buffer BidirectionalCounters {
+    uint remaining;        // places or vertices of a sweep whose shadow rays go on
+    uint greatest_splat;   // bits of the greatest band of a splat
+    uint connections[2];   // 64 bits, low word first: pairs of vertices, and vertices that the camera might see
+    uint shadow_rays[2];   // those that might bring light
+} bdpt_counters;
+layout(set = 3, binding = 5, scalar) restrict buffer LightSplats { LightSplat light_splats[]; };  // by vertex
+layout(set = 3, binding = 6, scalar) restrict buffer SplatSums { SplatSum splat_sums[]; };        // by group, then pixel
+
+#define COUNT_WIDE(COUNTER, AMOUNT) { \
+    uint counted_amount = AMOUNT; \
+    if (counted_amount > 0u && atomicAdd(bdpt_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
+        atomicAdd(bdpt_counters.COUNTER[1], 1u); \
+    } \
+}
+
+LightVertex load_light_vertex(uint index) {
+    int first = int(LIGHT_VERTEX_QUARTERS * index);
+    uvec4 q0 = texelFetch(light_vertex_texels, first);
+    vec4 q1 = uintBitsToFloat(texelFetch(light_vertex_texels, first + 1));
+    vec4 q2 = uintBitsToFloat(texelFetch(light_vertex_texels, first + 2));
+    return LightVertex(uintBitsToFloat(q0.xy), q0.z, q0.w >> LIGHT_GROUP_SHIFT, q0.w & ((1u << LIGHT_GROUP_SHIFT) - 1u), q1.xyz, q2.xyz, PartialWeights(q1.w, q2.w));
+}
+
+// Bits of the greatest splat in steps: with 2^22 splats a pixel's sum stays within 64 bits.
+const int SPLAT_BITS = 40;
+const uint FLOAT_EXPONENT_SHIFT = 23u;
+
+// A power of two, below the greatest splat by SPLAT_BITS bits, that no device flushes to zero.
+float splat_step(uint greatest) {
+    int exponent = max(int(greatest >> FLOAT_EXPONENT_SHIFT) + 1 - SPLAT_BITS, 1);
+    return uintBitsToFloat(uint(exponent) << FLOAT_EXPONENT_SHIFT);
+}
+
+#endif

@@ -1,0 +1,124 @@
+//! Pictures against the path tracer's.
+
+use super::*;
+use clerestory::scene::AlphaMode;
+
+const SAMPLES: u32 = 256;
+
+/// All but lamps that the camera sees itself, whose outlines are rare and bright in pixels that they barely touch.
+fn expect_agreement(gpu: &Gpu, scene: &Scene, samples: u32, reference: u32) {
+    let settings = BidirectionalSettings {
+        least_bounces: 1,
+        ..settings()
+    };
+    let found = passes(gpu, scene, &settings, samples);
+    found.expect_same_as(&scene.name, &traced(gpu, scene, "bounces=1..", reference));
+}
+
+/// A lamp on the ceiling, and one that hangs in the room and shines on all sides.
+#[test]
+fn lamps_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        expect_agreement(gpu, &builtin("builtin:cornell-box"), SAMPLES, 4096);
+        let mut hanging = room();
+        hanging.name = "hanging lamp".into();
+        add_lamp(&mut hanging, 3.0);
+        expect_agreement(gpu, &hanging, SAMPLES, 4096);
+        // Its light has been scattered twice before it comes down.
+        let mut shaded = builtin("builtin:shaded-lamp?opening=0.8");
+        shaded.name = "shaded lamp".into();
+        expect_agreement(gpu, &shaded, SAMPLES, 16_384);
+    });
+}
+
+#[test]
+fn lights_without_area_and_skies_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = room();
+        scene.name = "point and spot".into();
+        add_point(&mut scene, Vec3::new(0.3, 0.4, -0.1), 1.0);
+        scene.add_light(
+            "spot",
+            LightKind::Spot {
+                position: Vec3::new(-0.5, 0.9, 0.5),
+                direction: Vec3::new(0.3, -1.0, -0.2).normalize(),
+                intensity: Vec3::splat(2.0),
+                inner: 0.3,
+                outer: 0.7,
+            },
+        );
+        expect_agreement(gpu, &scene, SAMPLES, 2048);
+        let mut open = builtin("builtin:materials?slices=8");
+        open.name = "sky and sun".into();
+        let matte = open.add_material(Material::lambert("matte", Vec3::new(0.6, 0.5, 0.4)));
+        open.meshes.iter_mut().for_each(|mesh| mesh.material = Some(matte));
+        open.add_light(
+            "sun",
+            LightKind::Directional {
+                direction: Vec3::new(0.4, -1.0, -0.3).normalize(),
+                irradiance: Vec3::splat(1.0),
+            },
+        );
+        open.cameras[0].lens_radius = 0.0;
+        expect_agreement(gpu, &open, SAMPLES, 4096);
+    });
+}
+
+/// Mirrors, glass and its caustic, a rough metal with interpolated normals, coats, and panes that are there in part or let light through.
+#[test]
+fn materials_of_all_kinds_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut spheres = room();
+        spheres.name = "spheres".into();
+        add_lamp(&mut spheres, 3.0);
+        for (kind, x) in [("mirror", -0.6), ("glass", 0.0), ("gold", 0.6)] {
+            add_sphere(&mut spheres, kind, DVec3::new(x, -0.6, 0.3));
+        }
+        for material in spheres.materials.iter_mut().filter(|m| m.conductor.is_some()) {
+            material.roughness = material.roughness.max(0.5);
+        }
+        expect_agreement(gpu, &spheres, SAMPLES, 16_384);
+        let mut panes = room();
+        panes.name = "panes".into();
+        add_lamp(&mut panes, 3.0);
+        let coated = panes.add_material(Material {
+            specular: 1.0,
+            roughness: 0.5,
+            ..Material::lambert("coated", Vec3::new(0.2, 0.3, 0.6))
+        });
+        let polished = panes.add_material(Material {
+            specular: 1.0,
+            roughness: 0.0,
+            ..Material::lambert("polished", Vec3::new(0.6, 0.3, 0.2))
+        });
+        let blended = panes.add_material(Material {
+            base_color: Vec3::new(0.8, 0.7, 0.2).extend(0.5),
+            alpha_mode: AlphaMode::Blend,
+            ..Material::lambert("blended", Vec3::ONE)
+        });
+        let frosted = panes.add_material(Material {
+            transmission: 0.8,
+            roughness: 0.6,
+            specular: 1.0,
+            ..Material::lambert("frosted", Vec3::splat(0.9))
+        });
+        let solid = panes.add_material(Material {
+            transmission: 0.7,
+            thickness: 0.1,
+            roughness: 0.0,
+            specular: 1.0,
+            ..Material::lambert("solid", Vec3::new(0.9, 0.8, 0.9))
+        });
+        for (name, material, x) in [
+            ("coated", coated, -0.9),
+            ("polished", polished, -0.5),
+            ("blended", blended, -0.1),
+            ("frosted", frosted, 0.25),
+            ("solid", solid, 0.6),
+        ] {
+            let lower = Vec3::new(x, -0.9, 0.2);
+            panes.place(cuboid(name, material, lower, lower + Vec3::new(0.25, 1.2, 0.05)));
+        }
+        expect_agreement(gpu, &panes, SAMPLES, 16_384);
+    });
+}
