@@ -38,6 +38,8 @@ methods! {
     preview,
     ambient,
     instant_radiosity,
+    impostors,
+    localized_gather,
 }
 
 use std::collections::BTreeMap;

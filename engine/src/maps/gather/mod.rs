@@ -24,6 +24,7 @@ mod reflectivity;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use device::device_lights;
 pub use device::{Gather, gathered};
 pub use lights::{GatherLight, GatherLights, GatherPoint, GatherSettings, SolidAngleForm, Terms, gather_solid_angle};
 pub use reflectivity::{Reflectivity, cone_reflectivity};
