@@ -11,7 +11,6 @@ layout(local_size_x = 64) in;
 float gather_table_value(uint i);
 
 #include "maps/gather.glsl"
-#include "maps/packed_direction.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint count;
@@ -31,31 +30,6 @@ layout(set = 0, binding = 2, scalar) restrict readonly buffer Points { GatherPoi
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer Values { vec3 values[]; };
 
 float gather_table_value(uint i) { return gather_table[i]; }
-
-// Reflectivity times solid angle of a light.
-float gather_term(GatherRecord light, vec3 x, vec3 axis) {
-    vec3 v = light.position - x;
-    float squared = dot(v, v);
-    if (!(squared > 0.0)) {
-        return 0.0;
-    }
-    vec3 direction = v * inversesqrt(squared);
-    float to_point = 1.0;
-    if (GATHER_FORM == GATHER_NORMALS) {
-        to_point = -dot(unpack_octahedral(light.normal, PACKED_NORMAL_BITS), direction);
-    }
-    float angle = gather_solid_angle(light.area, squared, to_point);
-    float cosine = dot(axis, direction);
-    float reflectivity;
-    if (GATHER_CONES) {
-        reflectivity = gather_reflectivity(1.0 - angle / (2.0 * PI), cosine);
-    } else {
-        // pow of 0 is 0 for these exponents, but not by Vulkan's rules.
-        float c = max(cosine, 0.0);
-        reflectivity = (push.exponent + 1.0) / (2.0 * PI) * (push.exponent == 1.0 ? c : c > 0.0 ? pow(c, push.exponent) : 0.0);
-    }
-    return reflectivity * angle;
-}
 
 // Takes the place of a lesser entry, which it becomes.
 void gather_keep(inout vec4 kept, inout vec4 entry) {
@@ -77,7 +51,7 @@ void main() {
         vec4 a = vec4(0.0), b = vec4(0.0), c = vec4(0.0), d = vec4(0.0), e = vec4(0.0);
         for (uint k = 0u; k < push.lights; ++k) {
             GatherRecord light = gather_lights[k];
-            vec4 entry = vec4(light.radiance, gather_term(light, point.position, point.axis));
+            vec4 entry = vec4(light.radiance, gather_term(light, point.position, point.axis, push.exponent, GATHER_CONES));
             gather_keep(a, entry);
             gather_keep(b, entry);
             gather_keep(c, entry);
@@ -94,7 +68,7 @@ void main() {
         vec3 block = vec3(0.0);
         for (uint k = first; k < min(first + GATHER_BLOCK, push.lights); ++k) {
             GatherRecord light = gather_lights[k];
-            block += gather_term(light, point.position, point.axis) * light.radiance;
+            block += gather_term(light, point.position, point.axis, push.exponent, GATHER_CONES) * light.radiance;
         }
         sum += block;
     }

@@ -197,12 +197,18 @@ fn files_that_others_name_are_read_through_one_door() {
 }
 
 /// Methods that may use another one's code and kernels: photon mapping's eye paths are the path tracer's, as are those that virtual lights light, which walks
-/// leave as photons do; bidirectional paths have the path tracer's camera rays and way to the film.
-const METHODS_BESIDE: [[&str; 2]; 4] = [
+/// leave as photons do; bidirectional paths have the path tracer's camera rays and way to the film. Pictures by maps with distances are eye paths, too, and a
+/// localised gather has the same maps, which the preview's kernel shades.
+const METHODS_BESIDE: [[&str; 2]; 9] = [
     ["bidirectional", "path"],
     ["photon_mapping", "path"],
     ["instant_radiosity", "path"],
     ["instant_radiosity", "photon_mapping"],
+    ["impostors", "path"],
+    ["impostors", "preview"],
+    ["localized_gather", "path"],
+    ["localized_gather", "preview"],
+    ["localized_gather", "impostors"],
 ];
 
 #[test]

@@ -14,6 +14,8 @@ pub struct ObjectTriangles {
     pub object: u32,
     /// Its triangles.
     pub triangles: Range<u32>,
+    /// Its material's factors, whatever its textures, make it a mirror, or give it a smooth layer that mirrors in part.
+    pub mirrors: bool,
 }
 
 /// What of a scene its pixels depend on: what is absent is compiled out.

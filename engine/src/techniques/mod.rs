@@ -40,6 +40,8 @@ methods! {
     instant_radiosity,
     + instant_radiosity::MANY_LIGHT,
     bidirectional,
+    impostors,
+    localized_gather,
 }
 
 use std::collections::BTreeMap;

@@ -12,6 +12,21 @@ use crate::maps::is_unit;
 use crate::maps::packed_direction::pack_octahedral_nearest;
 use crate::{Error, Result};
 
+/// Lights as kernels read them, in their order, with their normals or without.
+pub(crate) fn device_lights(lights: &GatherLights, has_normals: bool) -> Vec<GatherRecord> {
+    let record = |light: &GatherLight| GatherRecord {
+        position: light.position.as_vec3().to_array(),
+        area: light.area as f32,
+        radiance: light.radiance.as_vec3().to_array(),
+        normal: if has_normals {
+            pack_octahedral_nearest(light.normal, PACKED_NORMAL_BITS)
+        } else {
+            0
+        },
+    };
+    lights.lights().iter().map(record).collect()
+}
+
 /// Lights on the device, the table of their reflectivities where one is asked for, and the kernel that sums over them. 32 bytes a light, with normals or
 /// without.
 #[derive(Debug)]
@@ -33,17 +48,7 @@ impl Gather {
         // Refuses exponents that no table has, with a table or without.
         let table = Reflectivity::new(f64::from(exponent))?;
         let has_normals = lights.form() == SolidAngleForm::DiscWithNormals;
-        let record = |light: &GatherLight| GatherRecord {
-            position: light.position.as_vec3().to_array(),
-            area: light.area as f32,
-            radiance: light.radiance.as_vec3().to_array(),
-            normal: if has_normals {
-                pack_octahedral_nearest(light.normal, PACKED_NORMAL_BITS)
-            } else {
-                0
-            },
-        };
-        let records: Vec<GatherRecord> = lights.lights().iter().map(record).collect();
+        let records = device_lights(lights, has_normals);
         let table = settings.cones.then_some(table);
         let upload = |table: Reflectivity| gpu.buffer_with("gather: reflectivities", Category::Light, table.values());
         Ok(Self {

@@ -73,6 +73,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/proxies.rs::spheres_err_as_published",
             "engine/src/maps/impostor/tests/proxies.rs::proxies_behind_a_ray_and_rays_along_walls_give_finite_distances",
             "tests/tests/twins/impostors.rs::proxies_agree_with_their_twins",
+            "tests/tests/impostor_pictures/reflections.rs::a_box_is_exact_in_a_box",
         ],
         api: &[
             "clerestory::maps::impostor::proxy::sphere_proxy",

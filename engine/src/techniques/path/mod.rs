@@ -14,6 +14,7 @@
 
 mod adaptive;
 pub(super) mod card;
+mod directions;
 mod full;
 mod in_order;
 mod kept;

@@ -1,5 +1,6 @@
 //! The path tracer's own kernels, specialized to what a scene needs.
 
+use super::directions::DirectionsStage;
 use super::settings::PathTracerSettings;
 use crate::Result;
 use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_refill, path_resolve, path_shade};
@@ -18,10 +19,11 @@ pub(super) struct Pipelines {
     pub resolve: ComputePipeline<path_resolve::Kernel>,
 }
 
-/// The first stage: of whole waves, or of waves that are kept full. It alone depends on the camera.
+/// The first stage: of whole waves, of waves that are kept full, or of pictures in all directions. It alone depends on the camera.
 pub(super) enum CameraStage {
     Whole(ComputePipeline<path_camera::Kernel>),
     Refilled(ComputePipeline<path_refill::Kernel>),
+    Directions(DirectionsStage),
 }
 
 impl CameraStage {
@@ -57,6 +59,7 @@ impl CameraStage {
         match self {
             Self::Whole(camera) => camera.info(),
             Self::Refilled(camera) => camera.info(),
+            Self::Directions(stage) => stage.pipeline().info(),
         }
     }
 }

@@ -130,14 +130,23 @@ impl WalkStages for EyeStages<'_> {
     }
 
     fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
-        let (UnderWay::Whole { wave: samples, .. }, CameraStage::Whole(camera)) =
-            (&self.under_way, &self.pipelines.camera)
-        else {
+        let UnderWay::Whole { wave: samples, .. } = &self.under_way else {
             return Ok(());
         };
         if let Some(adaptive) = self.adaptive {
             adaptive.record_numbers(recorder, &self.film.bands()[samples.band], samples)?;
         }
+        let camera = match &self.pipelines.camera {
+            CameraStage::Whole(camera) => camera,
+            CameraStage::Directions(stage) => {
+                return recorder.pass("path: directions", |pass| {
+                    stage.record(pass, wave, self.key(), samples.paths())?;
+                    stage_barrier(pass);
+                    Ok(())
+                });
+            }
+            CameraStage::Refilled(_) => return Ok(()),
+        };
         let push = path_camera::Push {
             view: self.view(),
             key: self.key(),

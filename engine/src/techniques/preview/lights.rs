@@ -57,7 +57,7 @@ impl PreviewShadows {
 
 /// How many lights there is room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct LightRoom {
+pub(in crate::techniques) struct LightRoom {
     pub all: u32,
     /// Those of them that may have a place, and then a shadow map.
     pub placed: u32,
@@ -98,7 +98,7 @@ pub struct PreviewLights {
 }
 
 impl PreviewLights {
-    pub(super) fn new(
+    pub(in crate::techniques) fn new(
         gpu: &Gpu,
         surfaces: &Surfaces<'_>,
         room: LightRoom,
@@ -151,7 +151,7 @@ impl PreviewLights {
     }
 
     /// Records shadow maps and records of these lights. Afterwards all is visible to compute shaders.
-    pub(super) fn record(
+    pub(in crate::techniques) fn record(
         &mut self,
         recorder: &mut Recorder,
         surfaces: &Surfaces<'_>,

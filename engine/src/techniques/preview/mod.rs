@@ -45,9 +45,10 @@ pub use probe::{LightProbe, LightProbeDesc};
 pub use reflection::{ReflectionMap, ReflectionMapDesc};
 pub use shade::{PARTS_MAX, PreviewPart};
 
+pub(in crate::techniques) use lights::LightRoom;
+pub(in crate::techniques) use shade::{Eye, OUTPUTS as SHADED_OUTPUTS, Seen, Shade, Target};
+
 use self::drawing::Drawing;
-use self::lights::LightRoom;
-use self::shade::Target;
 use crate::film::{Picture, PixelFormat};
 use crate::gpu::shaders::techniques::preview::preview_display;
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, rw_compute_to_compute};

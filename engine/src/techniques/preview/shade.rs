@@ -21,7 +21,7 @@ use crate::transport::{GpuScene, surface_spec};
 use crate::{Error, Result};
 
 /// What of a G-buffer the kernel reads.
-pub(super) const OUTPUTS: [Output; 2] = [Output::Triangle, Output::Weights];
+pub(in crate::techniques) const OUTPUTS: [Output; 2] = [Output::Triangle, Output::Weights];
 
 /// Parts that one picture may be shaded in, each by a probe of its own.
 pub const PARTS_MAX: usize = 64;
@@ -38,20 +38,20 @@ pub struct PreviewPart<'a> {
 }
 
 /// From where a picture is seen.
-pub(super) enum Eye<'a> {
+pub(in crate::techniques) enum Eye<'a> {
     Camera(&'a CameraFrame),
     AllDirections(Vec3),
 }
 
 /// Where radiance goes.
-pub(super) struct Target<'a> {
+pub(in crate::techniques) struct Target<'a> {
     pub buffer: &'a Buffer,
     pub first: u32,
     pub stride: u32,
 }
 
 /// What is shaded, seen from where, to where.
-pub(super) struct Seen<'a> {
+pub(in crate::techniques) struct Seen<'a> {
     pub scene: &'a GpuScene,
     pub gbuffer: &'a GBuffer,
     pub lights: &'a PreviewLights,
@@ -61,7 +61,7 @@ pub(super) struct Seen<'a> {
 
 /// The kernel, specialized to a scene and to how it is seen.
 #[derive(Debug)]
-pub(super) struct Shade {
+pub(in crate::techniques) struct Shade {
     pipeline: ComputePipeline<kernel::Kernel>,
     /// What scene and shadow maps it was made for.
     spec: kernel::Spec,

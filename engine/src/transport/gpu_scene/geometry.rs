@@ -13,7 +13,8 @@ use crate::accel::MAX_COORDINATE;
 use crate::gpu::shaders::constants::NO_LIGHT;
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::raster::ObjectTriangles;
-use crate::scene::{Instance, Mesh, Scene, SceneProfile};
+use crate::scene::{Instance, Material, Mesh, Scene, SceneProfile};
+use crate::transport::bsdf::Bsdf;
 use crate::{Error, Result};
 
 /// All instances flattened to world space, but for those that are kept.
@@ -52,6 +53,12 @@ pub(super) fn bounds_medium(scene: &Scene, instance: &Instance) -> bool {
     material.is_some_and(|index| scene.materials[index as usize].boundary)
 }
 
+/// Whether a material's factors make it a mirror, or give it a smooth layer.
+fn mirrors(material: &Material) -> bool {
+    let reflects = material.metallic > 0.0 || material.specular > 0.0;
+    reflects && !material.unlit && Bsdf::from_material(material).is_delta()
+}
+
 /// The triangles of each instance that is visible, from the first triangle on.
 pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
     let mut end = 0;
@@ -59,10 +66,15 @@ pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
         .take_while(|(_, instance)| !bounds_medium(scene, instance))
         .map(|(object, instance)| {
             let start = end;
-            end += scene.meshes[instance.mesh as usize].triangles.len() as u32;
+            let mesh = &scene.meshes[instance.mesh as usize];
+            end += mesh.triangles.len() as u32;
             ObjectTriangles {
                 object: object as u32,
                 triangles: start..end,
+                mirrors: mesh
+                    .material
+                    .map(|index| &scene.materials[index as usize])
+                    .is_some_and(mirrors),
             }
         })
         .collect()

@@ -87,6 +87,10 @@ impl PathSet {
     pub const UP_TO_TWO_ROUGH: Self = Self::simple(0, Some(2), LOBE_DIFFUSE | LOBE_GLOSSY);
     /// All but light that comes off a mirror to the first rough surface that the eye sees: `!L.*S[DG]S*E`.
     pub const LIT_OFF_NO_MIRROR: Self = Self::LIT_OFF_NO_MIRROR_STATES;
+    /// What is seen, direct light, and both in a mirror: `LE|L.E|L.SE`.
+    pub const DIRECT_AND_MIRRORED: Self = Self::once_more([1, 2, 1], 2);
+    /// What is seen, direct light, and that once more, scattered by a rough surface: `LE|L.E|L.[DG]E`.
+    pub const DIRECT_AND_ROUGH: Self = Self::once_more([1, 2, 2], 1);
     /// No path: a black picture.
     pub const EMPTY: Self = Self {
         min_bounces: 0,
@@ -108,6 +112,20 @@ impl PathSet {
             accepting: 0b111,
         }
     };
+
+    /// One scattering at most, which leads to these states by rough surfaces, specular ones and media, and one more from the state `goes_on`, 1 or 2.
+    const fn once_more([rough, specular, volume]: [u32; 3], goes_on: usize) -> Self {
+        let mut successors = [NO_SUCCESSORS; STATES];
+        let ends = 3 - goes_on as u32;
+        successors[0] = by_class(rough, specular, volume);
+        successors[goes_on] = by_class(ends, ends, ends);
+        Self {
+            min_bounces: 0,
+            max_bounces: None,
+            successors,
+            accepting: 0b111,
+        }
+    }
 
     /// Any order of some lobes.
     const fn simple(min_bounces: u32, max_bounces: Option<u32>, lobes: u32) -> Self {

@@ -1,0 +1,201 @@
+//! Reflections by distance impostors as a technique.
+
+use std::collections::BTreeMap;
+
+use super::ImpostorReflections;
+use super::settings::ReflectionSettings;
+use crate::Result;
+use crate::catalogue::{Role, Row, sources};
+use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
+use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert};
+use crate::gpu::shaders::techniques::impostors::impostor_reflect;
+use crate::gpu::shaders::techniques::path::path_directions;
+use crate::gpu::shaders::techniques::preview::preview_shade;
+use crate::gpu::{Buffer, PipelineInfo};
+use crate::scene::{Camera, SceneProfile};
+use crate::settings::{SettingsDecl, TypedSettings};
+use crate::techniques::path::card as path;
+use crate::techniques::{Bias, Card, Foresight, Skipped, Technique, Variant, reasons};
+use crate::transport::PathSet;
+
+/// The catalogue's entry.
+pub(in crate::techniques) const CARD: Card = Card {
+    id: "impostor",
+    summary: "direct light, and reflections of smooth surfaces by a map of radiance and distance, in which reflected rays are followed",
+    rows: &[ROWS],
+    bias: BIAS,
+    needs: NEEDS,
+    kernels: &[&path::KERNELS, &KERNELS],
+    path_set: PathSet::DIRECT_AND_MIRRORED,
+    refusals,
+    settings: SettingsDecl::of::<ReflectionSettings>(),
+    variants: &[Variant::DEFAULTS],
+    foresight: Foresight::PLAIN,
+    create: |gpu, scene, view, settings| {
+        let mut settings: ReflectionSettings = settings.read()?;
+        settings.seed = view.seed;
+        settings.aovs = view.aovs;
+        Ok(Box::new(ImpostorReflections::new(
+            gpu,
+            scene,
+            view.camera,
+            view.size,
+            settings,
+        )?))
+    },
+};
+
+/// The causes, as the module's documentation has them.
+const BIAS: Bias = Bias::Biased(
+    "what the map's place does not see is not there, radiance is that towards the map's place, searches end beside surfaces, and rasterized maps have the preview's shadows",
+);
+
+/// The path set as path sets are written.
+const DISPLAYED: &str = "L(S?|[^S]|.S)E";
+
+/// Octants are cut by clip distances.
+const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"];
+
+/// What a picture may take with default settings, beside what eye paths do.
+const KERNELS: [&ShaderInfo; 5] = [
+    &impostor_reflect::INFO,
+    &path_directions::INFO,
+    &preview_shade::INFO,
+    &surface_octant_vert::INFO,
+    &surface_frag::INFO,
+];
+
+/// Why a scene cannot be modelled by a map of its surfaces.
+pub(in crate::techniques) fn refusals(profile: &SceneProfile) -> Vec<String> {
+    reasons(&[
+        (
+            profile.media.any(),
+            "the scene has participating media, and the map holds surfaces only",
+        ),
+        (
+            profile.has_transmission(),
+            "surfaces transmit light, and nothing is followed through them",
+        ),
+        (
+            profile.keeps_instances,
+            "the map is drawn triangle by triangle, and the scene keeps its instances; with another ray index, such as `wide`, they are flattened",
+        ),
+    ])
+}
+
+impl Technique for ImpostorReflections {
+    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        ImpostorReflections::step(self, samples)
+    }
+
+    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        ImpostorReflections::picture(self)
+    }
+
+    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        ImpostorReflections::display(self, target, exposure, format)
+    }
+
+    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        ImpostorReflections::set_camera(self, camera)
+    }
+
+    fn path_set(&self) -> PathSet {
+        ImpostorReflections::path_set(self)
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        ImpostorReflections::settings(self).to_json()
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        ImpostorReflections::counters(self)
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        ImpostorReflections::pipelines(self)
+    }
+
+    fn skipped(&self) -> Vec<Skipped> {
+        ImpostorReflections::skipped(self)
+    }
+}
+
+/// Rows of the catalogue.
+const ROWS: &[Row] = &[
+    Row {
+        id: "CL-IMPOSTOR",
+        name: "technique `impostor`: direct light, and reflections of smooth surfaces by a distance impostor",
+        role: Role::Technique,
+        limits: "One layer of surfaces, so that what the map's place does not see is not there; reflecting bodies do not show in reflections.",
+        sources: &[
+            sources::SZIRMAY_KALOS_2005.whole(),
+            sources::UMENHOFFER_2007.at("chapter 17"),
+        ],
+        shaders: &[
+            "shaders/techniques/impostors/",
+            "shaders/techniques/path/",
+            "shaders/walk/",
+            "shaders/maps/impostor.glsl",
+            "shaders/maps/impostor_set.glsl",
+        ],
+        path_set: Some(DISPLAYED),
+        bias: Some(BIAS),
+        needs: NEEDS,
+        tests: &[
+            "tests/tests/impostor_pictures/reflections.rs::mirrors_in_a_diffuse_room_show_what_the_path_tracer_shows",
+            "tests/tests/impostor_pictures/reflections.rs::directions_err_as_published",
+            "tests/tests/impostor_pictures/edge_cases.rs::what_cannot_be_is_refused_by_name",
+            "tests/tests/impostor_pictures/edge_cases.rs::bits_are_the_same_whoever_does_the_work",
+            "engine/src/techniques/impostors/settings.rs::bad_settings_are_refused_by_name",
+            "engine/src/techniques/impostors/settings.rs::eye_paths_are_part_of_the_picture_and_bounces_are_those_of_the_map",
+        ],
+        api: &["clerestory::techniques::impostors::ImpostorReflections"],
+        settings: &[
+            "clerestory::techniques::impostors::ReflectionSettings",
+            "clerestory render --technique impostor",
+        ],
+        ..Row::of("engine/src/techniques/impostors/mod.rs")
+    },
+    Row {
+        id: "CL-CAPTURE",
+        name: "maps of what a place sees: distances and normals drawn, radiance drawn or by rays, objects left out",
+        role: Role::PartOf("CL-IMPOSTOR"),
+        limits: "Radiance at texels' middles; drawn maps have light of points, spots and directions alone.",
+        sources: &[
+            sources::SZIRMAY_KALOS_2005.whole(),
+            sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+        ],
+        shaders: &[
+            "shaders/techniques/path/path_directions.comp",
+            "shaders/techniques/preview/preview_shade.comp",
+            "shaders/raster/surface_octant.vert",
+        ],
+        bias: Some(Bias::Biased(
+            "radiance at texels' middles; the preview's shadows where it is drawn",
+        )),
+        needs: NEEDS,
+        tests: &[
+            "engine/src/techniques/impostors/capture.rs::parts_are_all_but_what_is_left_out",
+            "tests/tests/impostor_pictures/reflections.rs::area_lights_and_skies_are_mirrored_by_rays",
+            "tests/tests/impostor_pictures/reflections.rs::scale_changes_nothing",
+            "tests/tests/impostor_pictures/edge_cases.rs::without_a_reflector_there_is_no_map",
+            "tests/tests/impostor_pictures/edge_cases.rs::hard_places_give_finite_pictures",
+        ],
+        settings: &["capture", "side", "capture_samples", "shadow_side", "bounces"],
+        ..Row::of("engine/src/techniques/impostors/capture.rs")
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_path_set_is_that_of_its_expression_and_of_the_default_settings() {
+        assert_eq!(CARD.path_set, "LE|L.E|L.SE".parse().unwrap());
+        assert_eq!(CARD.path_set, ReflectionSettings::default().path_set().unwrap());
+    }
+}

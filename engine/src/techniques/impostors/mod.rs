@@ -1,0 +1,38 @@
+//! Reflections by distance impostors: what smooth surfaces mirror comes from a map of radiance and distance, everything else is direct light.
+//!
+//! Sources: L. Szirmay-Kalos, B. Aszódi, I. Lazányi, M. Premecz, "Approximate Ray-Tracing on the GPU with Distance Impostors", CGF 24(3) (Eurographics), 2005; those
+//! of [`maps::impostor`](crate::maps::impostor), whose searches these are, of the map ([`CaptureBy`]), and of the path tracer.
+//!
+//! Eye paths are the path tracer's: emission seen, and direct light where they first arrive, `LE|L[DG]E`. Where that is at a smooth surface, the ray that it mirrors is
+//! followed through the map, and the radiance that the map has there, times what the surface mirrors, is added. With light of so many scatterings in the map as
+//! the setting says, one by default, pictures have the paths `LE|L.E|L.SE`: light that is seen in a mirror comes from the map alone.
+//!
+//! The map is captured once, before the first sample, and holds for all cameras. What reflects is left out of it, so that it may be seen from within; its shadow is in it.
+//!
+//! Bias, all of it:
+//!
+//! - What the map's place does not see is not there: reflections stick to the edges of what hides it.
+//! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same.
+//! - Searches end beside surfaces: by how much, [`ImpostorReflections::counts`] and [`LookUp::residual`] say.
+//! - Radiance at texels' middles is joined bilinearly; with a capture by rays its noise stays.
+//! - Bodies that reflect do not show in reflections, their own included.
+//! - A rasterized map has the shadows of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), none of directional lights, and draws partial alpha opaque.
+//!
+//! In the limit of many texels and steps, what convex rooms of diffuse walls show in a convex mirror is exact.
+//!
+//! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit, and scenes that keep their instances.
+
+pub(in crate::techniques) mod capture;
+mod card;
+mod reflections;
+pub(in crate::techniques) mod renderer;
+mod settings;
+mod stage;
+
+pub use capture::CaptureBy;
+pub(super) use card::CARD;
+pub(in crate::techniques) use card::refusals;
+pub use reflections::ImpostorReflections;
+pub(in crate::techniques) use settings::check_place;
+pub use settings::{ReflectionMethod, ReflectionSettings};
+pub use stage::{LookUp, LookUpCounts};

@@ -1,0 +1,271 @@
+//! Pictures with reflections by a distance impostor.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::capture::{Capture, CaptureBy, CapturePlan, Captured, middle_of};
+use super::card::refusals;
+use super::renderer::{MapRenderer, MapUse};
+use super::settings::ReflectionSettings;
+use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
+use crate::film::picture::{NonFiniteSamples, Picture};
+use crate::film::{PixelFormat, Step};
+use crate::gpu::{Buffer, Gpu, PipelineInfo};
+use crate::raster::ObjectTriangles;
+use crate::scene::Camera;
+use crate::settings::TypedSettings;
+use crate::techniques::{PathTracer, PathTracerSettings, Skipped};
+use crate::transport::{GpuScene, PathSet};
+use crate::walk::ArrivalStage;
+use crate::{Error, Result};
+
+/// The technique's name in errors.
+const TECHNIQUE: &str = "impostor";
+
+/// A progressive rendering of one view whose smooth surfaces reflect by a map with distances.
+pub struct ImpostorReflections {
+    settings: ReflectionSettings,
+    path_set: PathSet,
+    place: Vec3,
+    renderer: MapRenderer<LookUps>,
+}
+
+/// The look-ups, once there is a map.
+struct LookUps {
+    settings: ReflectionSettings,
+    eye: PathSet,
+    place: Vec3,
+    triangles: Range<u32>,
+    reflections: Option<Reflections>,
+    counts: LookUpCounts,
+}
+
+impl MapUse for LookUps {
+    fn take(&mut self, gpu: &Gpu, scene: &GpuScene, captured: Captured, slots: u32) -> Result<()> {
+        let (map, eye) = ((captured, self.place), (&self.eye, slots));
+        let reflections = Reflections::new(gpu, scene, &self.settings, map, eye, self.triangles.clone())?;
+        self.reflections = Some(reflections);
+        Ok(())
+    }
+
+    fn stage<'a>(&'a self, scene: &'a GpuScene) -> Option<Box<dyn ArrivalStage + 'a>> {
+        let reflections = self.reflections.as_ref()?;
+        Some(Box::new(ReflectionStage { reflections, scene }))
+    }
+
+    fn count(&mut self) -> Result<()> {
+        if let Some(reflections) = &self.reflections {
+            let counts = reflections.counts()?;
+            self.counts.reflections += counts.reflections;
+            self.counts.sky += counts.sky;
+            self.counts.unfound += counts.unfound;
+        }
+        Ok(())
+    }
+
+    fn counters(&self) -> BTreeMap<&'static str, u64> {
+        let map_bytes = self.reflections.as_ref().map_or(0, Reflections::bytes);
+        BTreeMap::from([
+            ("reflections", self.counts.reflections),
+            ("reflections_of_sky", self.counts.sky),
+            ("reflections_unfound", self.counts.unfound),
+            ("map_bytes", map_bytes),
+        ])
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.reflections.iter().map(Reflections::pipeline).collect()
+    }
+}
+
+/// The objects that reflect, by a setting.
+fn reflectors<'a>(objects: &'a [ObjectTriangles], wanted: Option<u32>) -> Result<Vec<&'a ObjectTriangles>> {
+    let Some(number) = wanted else {
+        return Ok(objects.iter().filter(|object| object.mirrors).collect());
+    };
+    let object = objects.iter().find(|object| object.object == number);
+    let object = object.ok_or_else(|| Error::setting("reflector", number, "is the number of no visible object"))?;
+    if !object.mirrors {
+        return Err(Error::setting(
+            "reflector",
+            number,
+            "is an object without smooth surface",
+        ));
+    }
+    Ok(vec![object])
+}
+
+impl ImpostorReflections {
+    /// Prepares a rendering of `size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a setting or size out of range, and for a reflector that is none; [`Error::Unsupported`] for a scene with participating media, with
+    /// surfaces that transmit or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
+    /// [`Error::OutOfMemory`].
+    pub fn new(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: ReflectionSettings,
+    ) -> Result<Self> {
+        settings.check()?;
+        let reasons = refusals(scene.profile());
+        if !reasons.is_empty() {
+            return Err(Error::Unsupported {
+                technique: TECHNIQUE.into(),
+                reasons,
+            });
+        }
+        let surfaces = scene.surfaces();
+        let left_out: Vec<Range<u32>> = reflectors(surfaces.objects, settings.reflector)?
+            .into_iter()
+            .map(|object| object.triangles.clone())
+            .filter(|range| !range.is_empty())
+            .collect();
+        let place = match settings.place {
+            Some(place) => Vec3::from_array(place),
+            None => middle_of(gpu, &scene, &left_out)?.unwrap_or(Vec3::ZERO),
+        };
+        let triangles = match settings.reflector {
+            Some(_) => left_out.first().cloned().unwrap_or(0..0),
+            None => 0..surfaces.triangles,
+        };
+        let by = settings.capture.resolved(TECHNIQUE, &scene, settings.bounces)?;
+        let plan = CapturePlan {
+            place,
+            side: settings.side,
+            by,
+            bounces: [0, settings.bounces],
+            with_distances: settings.search().is_some(),
+            left_out,
+            shadow_side: settings.shadow_side,
+            samples: settings.capture_samples,
+            sampler: settings.sampler,
+            seed: settings.seed,
+        };
+        let has_reflector = !plan.left_out.is_empty();
+        let capture = has_reflector.then(|| Capture::new(gpu, &scene, plan)).transpose()?;
+        let (path_set, eye) = (settings.path_set()?, settings.eye_paths()?);
+        let eye_settings = PathTracerSettings {
+            path_set: eye,
+            sampler: settings.sampler,
+            seed: settings.seed,
+            aovs: settings.aovs,
+            // Counts are read wave by wave.
+            whole_waves: true,
+            ..PathTracerSettings::default()
+        };
+        let tracer = PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?;
+        let look_ups = LookUps {
+            settings: settings.clone(),
+            eye,
+            place,
+            triangles,
+            reflections: None,
+            counts: LookUpCounts::default(),
+        };
+        Ok(Self {
+            settings,
+            path_set,
+            place,
+            renderer: MapRenderer::new(gpu, scene, tracer, capture, look_ups),
+        })
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &ReflectionSettings {
+        &self.settings
+    }
+
+    /// Where the map is seen from, metres.
+    pub fn place(&self) -> Vec3 {
+        self.place
+    }
+
+    /// The light paths of the picture.
+    pub fn path_set(&self) -> PathSet {
+        self.path_set
+    }
+
+    /// Does a bounded piece of work towards `samples` samples per pixel: a piece of the map, or a submission of eye paths; `None` when all samples are there. A
+    /// rasterized map is one piece, however many triangles there are.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a place on a surface; [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
+    pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        self.renderer.step(samples)
+    }
+
+    /// The picture so far, as [`PathTracer::picture`] has it.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
+        self.renderer.picture()
+    }
+
+    /// As [`PathTracer::display`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
+        self.renderer.display(target, exposure, format)
+    }
+
+    /// Looks through another camera and begins anew, with the map there is.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
+    pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
+        self.renderer.set_camera(camera)
+    }
+
+    /// Exact counts of look-ups in waves that have ended.
+    pub fn counts(&self) -> LookUpCounts {
+        self.renderer.map_use.counts
+    }
+
+    /// Exact counts of all work by name.
+    pub fn counters(&self) -> BTreeMap<&'static str, u64> {
+        self.renderer.counters()
+    }
+
+    /// What the last wave has looked up, by slot: needs [`ReflectionSettings::keeps_look_ups`]. Empty without a reflector.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] without that setting; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn looked_up(&self) -> Result<Vec<LookUp>> {
+        let reflections = self.renderer.map_use.reflections.as_ref();
+        reflections.map_or(Ok(Vec::new()), |reflections| reflections.looked_up(self.renderer.gpu()))
+    }
+
+    /// The kernels with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        self.renderer.pipelines()
+    }
+
+    /// What was left out, and why.
+    pub fn skipped(&self) -> Vec<Skipped> {
+        let mut all = self.renderer.skipped(Skipped {
+            what: "distances, map and look-ups",
+            why: "nothing reflects",
+        });
+        if self.settings.search().is_none() {
+            all.push(Skipped {
+                what: "distances",
+                why: "the method looks none up",
+            });
+        }
+        if self.settings.capture == CaptureBy::Rays {
+            all.push(Skipped {
+                what: "shadow maps",
+                why: "the map is captured by rays",
+            });
+        }
+        all
+    }
+}

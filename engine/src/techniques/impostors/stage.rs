@@ -1,0 +1,234 @@
+//! Reflected rays at work: where eye paths first arrive at smooth surfaces, what the rays meet is looked up in the map. A stage of the path tracer's bounces.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::capture::Captured;
+use super::settings::{ReflectionMethod, ReflectionSettings};
+use crate::gpu::interface::BindingSet;
+use crate::gpu::shaders::constants::{DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL};
+use crate::gpu::shaders::sets::{ImpostorSet, WaveSet};
+use crate::gpu::shaders::techniques::impostors::impostor_reflect as kernel;
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
+use crate::maps::impostor::Impostor;
+use crate::transport::{GpuScene, PathSet, surface_spec};
+use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
+use crate::{Error, Result};
+
+/// A reflected ray, and where the map was looked up for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LookUp {
+    /// The eye path's slot in its wave: with a sample per pixel and one wave, the pixel.
+    pub slot: u32,
+    /// Where the ray begins, from the map's place, metres.
+    pub origin: Vec3,
+    /// Its unit direction.
+    pub direction: Vec3,
+    /// The unit direction in which the map shows what it meets.
+    pub found: Vec3,
+    /// |1 − g|, how far the place that was found is from a surface, relatively; 1 where nothing was searched for.
+    pub residual: f32,
+}
+
+/// Exact counts of look-ups.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
+pub struct LookUpCounts {
+    /// Reflected rays.
+    pub reflections: u64,
+    /// Those that left to the sky.
+    pub sky: u64,
+    /// Those whose search ended farther from a surface than the tolerance.
+    pub unfound: u64,
+}
+
+type Counters = kernel::ReflectionCounters;
+type Record = crate::gpu::shaders::types::ReflectionRecord;
+
+/// The map on the device, and the kernel.
+pub(super) struct Reflections {
+    pipeline: ComputePipeline<kernel::Kernel>,
+    radiance: Buffer,
+    side: u32,
+    impostor: Option<Impostor>,
+    place: Vec3,
+    tolerance: f32,
+    triangles: Range<u32>,
+    records: Option<Buffer>,
+    counters: Buffer,
+    counters_readback: Buffer,
+}
+
+impl Reflections {
+    /// For eye paths of the set `eye`, up to `slots` at once, that arrive at some triangles.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        settings: &ReflectionSettings,
+        (captured, place): (Captured, Vec3),
+        (eye, slots): (&PathSet, u32),
+        triangles: Range<u32>,
+    ) -> Result<Self> {
+        let search = settings.search();
+        let impostor = captured
+            .impostor
+            .as_ref()
+            .map(|image| Impostor::new(gpu, image))
+            .transpose()?;
+        let spec = surface_spec!(kernel, scene, {
+            has_multiple_scattering: false,
+            separable_masking: false,
+            has_path_automaton: eye.has_automaton(),
+            directional_kind: DIRECTIONAL_OCTAHEDRON,
+            directional_border: 0,
+            impostor_method: search.map_or(IMPOSTOR_CLASSICAL, |search| search.method.number()),
+            impostor_steps: search.map_or(0, |search| search.steps),
+            impostor_bisections: search.map_or(0, |search| search.bisections),
+            impostor_layers: 1,
+            impostor_planes: impostor.is_some(),
+            reflects_in_box: settings.method == ReflectionMethod::Box,
+            keeps_look_ups: settings.keeps_look_ups,
+            ..Default::default()
+        });
+        let bytes = size_of::<Counters>() as u64;
+        let records = || {
+            let bytes = u64::from(slots) * size_of::<Record>() as u64;
+            gpu.buffer(&BufferDesc::storage("reflection look-ups", bytes, Category::Work))
+        };
+        Ok(Self {
+            pipeline: gpu.compute_pipeline(&spec)?,
+            radiance: captured.radiance,
+            side: captured.side,
+            impostor,
+            place,
+            tolerance: settings.tolerance,
+            triangles,
+            records: settings.keeps_look_ups.then(records).transpose()?,
+            counters: gpu.buffer(&BufferDesc::storage("reflection counters", bytes, Category::Work))?,
+            counters_readback: gpu.buffer(&BufferDesc::readback("reflection counters", bytes))?,
+        })
+    }
+
+    pub fn pipeline(&self) -> PipelineInfo {
+        self.pipeline.info()
+    }
+
+    /// Bytes of the map.
+    pub fn bytes(&self) -> u64 {
+        let distances = self.impostor.as_ref().map_or([0; 2], Impostor::bytes);
+        self.radiance.bytes() + distances.iter().sum::<u64>()
+    }
+
+    /// Counts of the last wave.
+    pub fn counts(&self) -> Result<LookUpCounts> {
+        let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
+        Ok(LookUpCounts {
+            reflections: counters.reflections.into(),
+            sky: counters.sky.into(),
+            unfound: counters.unfound.into(),
+        })
+    }
+
+    /// What the last wave has looked up, by slot.
+    pub fn looked_up(&self, gpu: &Gpu) -> Result<Vec<LookUp>> {
+        let Some(records) = &self.records else {
+            let cause = "is needed before, and is off";
+            return Err(Error::setting("keeps_look_ups", false, cause));
+        };
+        let count = (records.bytes() / size_of::<Record>() as u64) as usize;
+        let records: Vec<Record> = gpu.read(records.view(), count)?;
+        let used = (0..).zip(records).filter(|(_, record)| record.is_used != 0);
+        Ok(used
+            .map(|(slot, record)| LookUp {
+                slot,
+                origin: Vec3::from_array(record.origin),
+                direction: Vec3::from_array(record.direction),
+                found: Vec3::from_array(record.found),
+                residual: record.residual,
+            })
+            .collect())
+    }
+}
+
+/// Look-ups to be recorded with a wave.
+pub(super) struct ReflectionStage<'a> {
+    pub reflections: &'a Reflections,
+    pub scene: &'a GpuScene,
+}
+
+impl ReflectionStage<'_> {
+    fn push(&self) -> kernel::Push {
+        let r = self.reflections;
+        let [lower, upper] = self.scene.bounds().map(|corner| corner.to_array());
+        kernel::Push {
+            scene_lower: lower,
+            first_triangle: r.triangles.start,
+            scene_upper: upper,
+            end_triangle: r.triangles.end,
+            place: r.place.to_array(),
+            tolerance: r.tolerance,
+            side: r.side,
+        }
+    }
+
+    /// Set 1; without distances another buffer stands in their place, which no kernel reads.
+    fn impostor_set(&self) -> ImpostorSet<'_> {
+        let r = self.reflections;
+        r.impostor.as_ref().map_or(
+            ImpostorSet {
+                impostor_shapes: r.radiance.view(),
+                impostor_distances: r.radiance.view(),
+                impostor_normals: r.radiance.view(),
+            },
+            Impostor::set,
+        )
+    }
+
+    fn set(&self) -> kernel::Set3<'_> {
+        let r = self.reflections;
+        kernel::Set3 {
+            map_radiance: r.radiance.view(),
+            reflection_counters: r.counters.view(),
+            // Kernels that keep none do not write it.
+            reflection_records: r.records.as_ref().unwrap_or(&r.counters).view(),
+        }
+    }
+}
+
+impl ArrivalStage for ReflectionStage<'_> {
+    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+        let (distances, scene, own) = (self.impostor_set(), self.scene.scene_set(), self.set());
+        recorder.pass("impostor: reflect", |pass| {
+            let sets: [&dyn BindingSet<'_>; 4] = [wave, &distances, &scene, &own];
+            pass.dispatch_indirect(&self.reflections.pipeline, &sets, &self.push(), places.items)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        if let Some(records) = &self.reflections.records {
+            pass.fill(records.view(), 0)?;
+        }
+        pass.update(self.reflections.counters.view(), &[Counters::default()])
+    }
+
+    fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.copy(
+            self.reflections.counters.view(),
+            self.reflections.counters_readback.view(),
+        )
+    }
+
+    /// A look-up never stops.
+    fn record_stopped(
+        &self,
+        _recorder: &mut Recorder,
+        _wave: &WaveSet<'_>,
+        _stopped: StoppedPlaces,
+        _part: u64,
+    ) -> Result<Option<u64>> {
+        Ok(None)
+    }
+}

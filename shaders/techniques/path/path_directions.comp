@@ -1,0 +1,33 @@
+#version 460
+// Wavefront path tracer, first stage of pictures in all directions: paths along the middles of an octahedron's texels, one slot each (slot = texel × samples +
+// sample). Each begins in front of what its texel is known to show, so that what stands between is not seen.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "maps/octahedron.glsl"
+#include "walk/wave.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    WalkKey key;
+    vec3 place;
+    uint side;  // texels across and down
+    uint slot_count;
+    uint interior;  // material of the body that the place is inside of, or OUTSIDE
+} push;
+
+// How far from the place the paths of a texel begin.
+layout(set = 1, binding = 0, scalar) restrict readonly buffer Starts { float path_starts[]; };
+
+void main() {
+    uint slot = gl_GlobalInvocationID.x;
+    if (slot >= push.slot_count) {
+        return;
+    }
+    uint texel = push.key.first_sequence + slot / push.key.indices;
+    vec2 at = (2.0 * vec2(texel % push.side, texel / push.side) + 1.0) / float(push.side) - 1.0;
+    vec3 direction = octahedron_decode(at);
+    walk_states_out[slot] = WalkState(push.place + path_starts[texel] * direction, 1.0, direction, 0u, vec3(1.0), 0.0);
+    walk_gathered[slot] = GatheredLight(vec3(0.0), push.interior);
+}

@@ -1,0 +1,188 @@
+//! What must not be, hard places, and bits.
+
+use super::*;
+use clerestory::Error;
+use clerestory::techniques::impostors::{ImpostorReflections, ReflectionSettings};
+use clerestory::transport::GpuScene;
+use clerestory_tests::child::hash_in_child;
+use clerestory_tests::render::builtin;
+use std::sync::Arc;
+
+/// Neither map nor look-up: the picture is the eye paths' own, to the bit.
+#[test]
+fn without_a_reflector_there_is_no_map() {
+    with_gpu(|gpu| {
+        const SIZE: u32 = 16;
+        let mut scene = room_with(Material::lambert("matte", Vec3::splat(0.5)), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut scene, 1.0);
+        let renderer = renderer(gpu, &scene);
+        let found = rendered(&renderer, "impostor", SIZE, 8, Value::Null);
+        let eye = rendered(&renderer, "path", SIZE, 8, json!({"path_set": "LE|L[DG]E"}));
+        assert_eq!(layer(&found, "radiance"), layer(&eye, "radiance"));
+        let counters = &found.report.counters;
+        for name in ["capture_steps", "reflections", "map_bytes"] {
+            assert_eq!(counters[name], 0, "{name}");
+        }
+        let names = |rendered: &Rendered| -> Vec<String> {
+            rendered.report.passes.iter().map(|pass| pass.name.clone()).collect()
+        };
+        assert_eq!(names(&found), names(&eye));
+        assert!(
+            found
+                .report
+                .skipped
+                .iter()
+                .any(|skipped| skipped.why == "nothing reflects")
+        );
+        // With one, there are.
+        let mut shiny = room_with(mirror(), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut shiny, 1.0);
+        let shiny = super::renderer(gpu, &shiny);
+        let classical = rendered(&shiny, "impostor", SIZE, 8, json!({"method": "classical", "side": 64}));
+        let hybrid = rendered(&shiny, "impostor", SIZE, 8, json!({"side": 64}));
+        assert!(names(&hybrid).iter().any(|name| name == "impostor: reflect"));
+        // Three numbers a texel, and two more where there are distances.
+        let bytes = |rendered: &Rendered| rendered.report.counters["map_bytes"];
+        assert_eq!(
+            [bytes(&classical), bytes(&hybrid)],
+            [12, 20].map(|texel| 64 * 64 * texel)
+        );
+    });
+}
+
+#[test]
+fn what_cannot_be_is_refused_by_name() {
+    with_gpu(|gpu| {
+        let mut scene = room_with(mirror(), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut scene, 1.0);
+        let refused = |scene: &Scene, technique: &str, settings: Value, words: &str| {
+            let options = RenderOptions {
+                technique: Some(technique.into()),
+                size: [8; 2],
+                spp: 1,
+                settings: settings.into(),
+                ..RenderOptions::default()
+            };
+            let error = renderer(gpu, scene).render(&options).err();
+            let error = error.unwrap_or_else(|| panic!("{technique}: {words}")).to_string();
+            assert!(error.contains(words), "{technique}: {error}");
+        };
+        let glass = builtin("builtin:cornell-box?sphere=glass");
+        let fog = builtin("builtin:fog-box");
+        for technique in ["impostor", "localized-gather"] {
+            refused(&glass, technique, Value::Null, "transmit");
+            refused(&fog, technique, Value::Null, "participating media");
+            refused(&scene, technique, json!({"side": 0}), "side");
+            refused(&scene, technique, json!({"place": [0.0, 1.0]}), "place");
+            refused(
+                &scene,
+                technique,
+                json!({"bounces": 2, "capture": "raster"}),
+                "scatter light once",
+            );
+        }
+        refused(&scene, "impostor", json!({"reflector": 99}), "reflector");
+        refused(&scene, "impostor", json!({"reflector": 0}), "without smooth surface");
+        refused(&scene, "impostor", json!({"method": "march", "steps": 0}), "steps");
+        refused(&scene, "impostor", json!({"steps": 257}), "steps");
+        refused(&scene, "impostor", json!({"tolerance": 0.0}), "tolerance");
+        refused(&scene, "localized-gather", json!({"object": 99}), "object");
+        refused(&scene, "localized-gather", json!({"lights": 0}), "lights");
+        refused(&scene, "localized-gather", json!({"lights": 48}), "does not divide");
+        let on_device = Arc::new(GpuScene::new(gpu, &scene).unwrap());
+        let settings = ReflectionSettings {
+            place: Some([f32::NAN, 0.0, 0.0]),
+            ..ReflectionSettings::default()
+        };
+        let error = ImpostorReflections::new(gpu, on_device, &scene.cameras[0], [8; 2], settings).err();
+        assert!(
+            matches!(&error, Some(Error::Setting { name, .. }) if name == "place"),
+            "{error:?}"
+        );
+    });
+}
+
+/// Spheres at walls, walls in front of the map, maps outside of the room, and an empty sky: pictures are finite, and rays to the sky are counted as such.
+#[test]
+fn hard_places_give_finite_pictures() {
+    with_gpu(|gpu| {
+        const SIZE: u32 = 16;
+        let mut at_wall = room_with(mirror(), DVec3::new(0.7, 0.0, 0.0), 0.3, EYE, 1.2, 1.0);
+        lamp(&mut at_wall, 1.0);
+        let mut thin = room_with(mirror(), B, 0.3, EYE, 1.2, 1.0);
+        lamp(&mut thin, 1.0);
+        let screen = thin.add_material(Material::lambert("screen", Vec3::splat(0.5)));
+        let at = |y: f32, z: f32| Vec3::new(0.01, y, z);
+        thin.place(quad(
+            "screen",
+            screen,
+            [at(-0.2, -0.2), at(0.2, -0.2), at(0.2, 0.2), at(-0.2, 0.2)],
+        ));
+        let mut open = room_with(mirror(), DVec3::ZERO, 0.3, EYE, 1.2, 1.0);
+        lamp(&mut open, 1.0);
+        // Of the walls the floor alone is left.
+        open.instances = vec![open.instances[3].clone(), open.instances[6].clone()];
+        let cases = [
+            ("at a wall", &at_wall, Value::Null, false),
+            ("thin wall before the map", &thin, json!([0.0, 0.0, 0.0]), false),
+            ("outside of the room", &thin, json!([0.0, 0.0, 50.0]), true),
+            ("within a wall's plane", &at_wall, json!([1.0, 2.0, 0.0]), true),
+            ("open to the sky", &open, Value::Null, true),
+        ];
+        for (name, scene, place, has_sky) in cases {
+            let renderer = renderer(gpu, scene);
+            for method in ["hybrid", "march"] {
+                let settings = json!({"place": place, "side": 64, "method": method, "steps": 16});
+                let found = rendered(&renderer, "impostor", SIZE, 4, settings);
+                let counters = &found.report.counters;
+                assert!(counters["reflections"] > 0, "{name}");
+                let sky = counters["reflections_of_sky"];
+                assert!(has_sky || sky == 0, "{name}, {method}: {sky} to the sky");
+                if name == "open to the sky" {
+                    assert!(sky > 0 && sky < counters["reflections"], "{name}, {method}: {sky}");
+                }
+            }
+            let settings = json!({"place": place, "side": 64, "lights": 16});
+            rendered(&renderer, "localized-gather", SIZE, 4, settings);
+        }
+    });
+}
+
+/// Set in the processes that only print their pictures' hash.
+const CHILD: &str = "CLERESTORY_TEST_PRINT_IMPOSTOR_HASH";
+const CHILD_TEST: &str = "edge_cases::prints_its_hash_when_asked";
+
+/// On one thread of the driver and on two, and on vectors of 4, 8 and 16 lanes.
+#[test]
+fn bits_are_the_same_whoever_does_the_work() {
+    let hash = |threads, width| {
+        let variables = [("LP_NUM_THREADS", threads), ("LP_NATIVE_VECTOR_WIDTH", width)];
+        hash_in_child(CHILD_TEST, CHILD, &variables)
+    };
+    let truth = hash("1", "256");
+    assert_eq!(hash("2", "128"), truth);
+    assert_eq!(hash("2", "512"), truth);
+}
+
+#[test]
+fn prints_its_hash_when_asked() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    with_gpu(|gpu| {
+        let mut scene = room_with(mirror(), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut scene, 1.0);
+        let renderer = renderer(gpu, &scene);
+        let mut hash = 0xcbf2_9ce4_8422_2325u64;
+        for (technique, settings) in [
+            ("impostor", json!({"side": 64})),
+            ("localized-gather", json!({"side": 64, "lights": 16})),
+        ] {
+            let found = rendered(&renderer, technique, 16, 2, settings);
+            for bits in layer(&found, "radiance").iter().map(|value| value.to_bits()) {
+                hash = (hash ^ u64::from(bits)).wrapping_mul(0x0100_0000_01b3);
+            }
+        }
+        println!("hash {hash:016x}");
+    });
+}
