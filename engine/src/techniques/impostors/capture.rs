@@ -371,7 +371,8 @@ fn parts_without(surfaces: &Surfaces<'_>, left_out: &[Range<u32>]) -> Vec<DrawPa
 
 /// The paths of a map: each begins in front of what its texel shows, or outside of the scene.
 fn paths(gpu: &Gpu, scene: &Arc<GpuScene>, plan: &CapturePlan, impostor: Option<&ImpostorImage>) -> Result<PathTracer> {
-    let outside = 2.0 * scene.surfaces().reach(plan.place);
+    // Finite, so that origins are.
+    let outside = (2.0 * scene.surfaces().reach(plan.place)).min(ImpostorImage::NOTHING);
     let start = |distance: &f32| {
         if *distance < ImpostorImage::NOTHING {
             (1.0 - LEAD) * distance
