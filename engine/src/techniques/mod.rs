@@ -38,10 +38,10 @@ methods! {
     preview,
     ambient,
     instant_radiosity,
-    + instant_radiosity::MANY_LIGHT,
     bidirectional,
     impostors,
     localized_gather,
+    + instant_radiosity::MANY_LIGHT,
 }
 
 use std::collections::BTreeMap;

@@ -6,11 +6,9 @@
 #ifndef CLERESTORY_TECHNIQUES_BIDIRECTIONAL_BDPT_BOTH_WAYS_GLSL
 #define CLERESTORY_TECHNIQUES_BIDIRECTIONAL_BDPT_BOTH_WAYS_GLSL
 
+#include "finite.glsl"
 #include "techniques/bidirectional/bdpt_mis.glsl"
 #include "transport/arrival.glsl"
-
-// The greatest finite number.
-const float FINITE_MAX = 3.402823e38;
 
 // The same point for a way that comes from `wo`.
 Arrival arrival_from(Arrival a, vec3 wo) {

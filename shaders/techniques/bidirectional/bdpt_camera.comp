@@ -116,7 +116,7 @@ vec3 splat(LightVertex vertex, uvec4 words, out uint pixel, out Ray ray) {
     found = absorbed(found, arrival_interior(arrival_from(a, seen.direction), OUTSIDE), length(seen.to));
     ray.origin = offset_ray_origin(point.position, point.error, a.surface.geometric_normal, seen.direction);
     ray.direction = point.position + seen.to - ray.origin;
-    return all(lessThanEqual(found, vec3(FINITE_MAX))) ? found : vec3(0.0);
+    return finite_or_black(found);
 }
 
 void main() {

@@ -139,8 +139,7 @@ vec3 connection(Receiver r, LightVertex vertex, out Ray ray) {
     vec3 end;
     shadow_segment(s.point, s.geometric_normal, there.surface.point, there.surface.geometric_normal, ray.origin, end);
     ray.direction = end;
-    // What overflows is closer than numbers can tell.
-    return all(lessThanEqual(found, vec3(FINITE_MAX))) ? found : vec3(0.0);
+    return finite_or_black(found);
 }
 
 // Goes on with the connections of a place.

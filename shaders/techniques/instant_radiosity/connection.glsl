@@ -7,6 +7,7 @@
 #ifndef CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_CONNECTION_GLSL
 #define CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_CONNECTION_GLSL
 
+#include "finite.glsl"
 #include "techniques/instant_radiosity/split_place.glsl"
 #include "techniques/instant_radiosity/virtual_light.glsl"
 #include "transport/arrival.glsl"
@@ -14,8 +15,6 @@
 
 layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
 
-// The greatest finite number.
-const float FINITE_MAX = 3.402823e38;
 // Loop iterations that a connection without its ray counts as.
 const uint CONNECTION_ITERATIONS = 4u;
 
@@ -74,8 +73,7 @@ vec3 connection(Receiver r, VirtualLight light, out Ray ray) {
     ray.origin = offset_ray_origin(s.point.position, s.point.error, s.geometric_normal, wi);
     vec3 end = light.position + light.normal * (dot(light.normal, wi) > 0.0 ? -light.offset : light.offset);
     ray.direction = end - ray.origin;
-    // What overflows is closer than numbers can tell.
-    return all(lessThanEqual(found, vec3(FINITE_MAX))) ? found : vec3(0.0);
+    return finite_or_black(found);
 }
 
 VirtualLight load_virtual_light(uint index) {

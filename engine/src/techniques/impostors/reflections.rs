@@ -156,7 +156,7 @@ impl ImpostorReflections {
             seed: settings.seed,
             aovs: settings.aovs,
             // Counts are read wave by wave.
-            whole_waves: true,
+            full_waves: false,
             ..PathTracerSettings::default()
         };
         let tracer = PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?;

@@ -69,7 +69,7 @@ impl PathTracer {
         let camera = Camera::look_at("all directions", eye, eye + DVec3::Z, DVec3::Y, 1.0);
         let settings = PathTracerSettings {
             aovs: false,
-            whole_waves: true,
+            full_waves: false,
             ..settings
         };
         let mut tracer = Self::new(gpu, scene, &camera, [side; 2], settings)?;
