@@ -60,7 +60,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         "in a corner",
         point(Vec3::new(-0.4, 0.7, -0.3) + Vec3::new(1.0, -1.0, 1.0) * 1e-4),
     );
-    // Kernels of a fiftieth of the scene reach a fifth of a metre around the box; of the walks of a picture some ten end within rounding of an edge.
+    // Kernels of a fiftieth of the scene reach a fifth of a metre around the box; one walk in thousands ends within rounding of an edge.
     judgement.exactly_unless_biased(
         "light in a box",
         &easel.paint(&boxed, SMALL, 64)?,
