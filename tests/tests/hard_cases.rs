@@ -30,11 +30,16 @@ fn fault(case: &HardCase, subject: &Subject, outcome: &Outcome) -> Option<String
 
 /// Judges all cases on the subjects of a kind.
 fn check(kind: impl Fn(&Subject) -> bool) {
+    check_some(kind, |_| true);
+}
+
+/// Judges some cases on the subjects of a kind.
+fn check_some(kind: impl Fn(&Subject) -> bool, some: impl Fn(&HardCase) -> bool) {
     with_gpu(|gpu| {
         let mut faults = Vec::new();
         let mut judged = 0;
         for subject in subjects().iter().filter(|subject| kind(subject)) {
-            for case in all() {
+            for case in all().iter().filter(|case| some(case)) {
                 if let Some(outcome) = judge(gpu, case, subject) {
                     judged += 1;
                     faults.extend(fault(case, subject, &outcome));
@@ -47,12 +52,25 @@ fn check(kind: impl Fn(&Subject) -> bool) {
 }
 
 /// Subjects that have a test each; all other techniques share one.
-const ALONE: [&str; 3] = ["path (sobol)", "path (pcg)", "photon"];
+const ALONE: [&str; 4] = ["path (sobol)", "path (pcg)", "photon", "vpl"];
 
 fn check_alone(name: &str) {
-    assert!(ALONE.contains(&name), "{name} is judged twice");
-    check(|subject| subject.name() == name);
+    check_some_alone(name, |_| true);
 }
+
+fn check_some_alone(name: &str, some: impl Fn(&HardCase) -> bool) {
+    assert!(ALONE.contains(&name), "{name} is judged twice");
+    check_some(|subject| subject.name() == name, some);
+}
+
+/// Cases of materials, whose pictures by virtual lights take as long as those of all others.
+const OF_MATERIALS: [&str; 5] = [
+    "nested-dielectrics",
+    "extreme-roughness",
+    "extreme-refraction",
+    "grazing-incidence",
+    "black-and-white",
+];
 
 #[test]
 fn the_path_tracer_takes_the_cases_as_documented() {
@@ -67,6 +85,16 @@ fn the_path_tracer_takes_the_cases_with_independent_samples() {
 #[test]
 fn photon_mapping_takes_the_cases_as_documented() {
     check_alone("photon");
+}
+
+#[test]
+fn virtual_lights_take_the_cases_of_materials_as_documented() {
+    check_some_alone("vpl", |case| OF_MATERIALS.contains(&case.name));
+}
+
+#[test]
+fn virtual_lights_take_the_other_cases_as_documented() {
+    check_some_alone("vpl", |case| !OF_MATERIALS.contains(&case.name));
 }
 
 #[test]

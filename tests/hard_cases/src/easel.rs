@@ -20,8 +20,10 @@ const PHOTON_TOLERANCE: f64 = 6.4;
 /// The same of techniques with a bias that have no photons.
 pub(crate) const OTHER_TOLERANCE: f64 = 0.05;
 
-/// Passes of a picture, where all pixels share the noise of one: enough for a variance of their means.
-pub(crate) const PASSES: u32 = 16;
+/// Passes of a picture at most, where all pixels share the noise of one: enough for a variance of their means. Most of the noise is theirs, whatever the samples.
+pub(crate) const PASSES: u32 = 12;
+/// Samples that a pass may have.
+const PASS_SAMPLES_MAX: u32 = 4096;
 
 /// What the mean over a picture may be wrong by where so many photons light it.
 pub(crate) fn photon_tolerance(photons: f64) -> f64 {
@@ -37,8 +39,6 @@ pub struct Easel<'a> {
     pub info: &'static Card,
     settings: serde_json::Map<String, Value>,
     seed: u32,
-    /// Samples of a pass, where means over pictures are judged by those of their passes.
-    pass_samples: Option<u32>,
 }
 
 /// A finished picture.
@@ -59,7 +59,8 @@ pub struct Painted {
     /// Relative error that the mean over the picture may have beside what its variance says; above 0 single pixels promise nothing.
     pub tolerance: f64,
     /// Means over the picture in each pass, where all pixels share the noise of one: single pixels promise nothing then, and their variance says nothing of the mean.
-    pub passes: Vec<[f64; 3]>,
+    /// Of a picture that was not [painted in passes](Easel::paint_in_passes) there are none, and nothing is allowed to its noise.
+    pub passes: Option<Vec<[f64; 3]>>,
 }
 
 impl Painted {
@@ -90,7 +91,6 @@ impl<'a> Easel<'a> {
             info,
             settings,
             seed: SEED,
-            pass_samples: None,
         }
     }
 
@@ -125,19 +125,10 @@ impl<'a> Easel<'a> {
         }
     }
 
-    /// The same for pictures of so many samples. Where the technique has no bias and all pixels share the noise of a pass, they have [`PASSES`] of them.
-    ///
-    /// # Errors
-    /// Those of the technique's law, for settings that it does not know.
-    pub(crate) fn in_passes(&self, spp: u32) -> Result<Self> {
-        let mut easel = self.clone();
-        if self.has_bias() || !shares_noise(self.info, &self.settings())? {
-            return Ok(easel);
-        }
-        easel = easel.with("samples_per_pass", spp.div_ceil(PASSES));
-        let law = (self.info.foresight.law)(&easel.settings())?;
-        easel.pass_samples = Some(law.samples_a_pass);
-        Ok(easel)
+    /// Samples of a pass, where the technique has no bias and all pixels share the noise of a pass: means over pictures are judged by those of their passes then.
+    fn pass_samples(&self) -> Result<Option<u32>> {
+        let law = (self.info.foresight.law)(&self.settings())?;
+        Ok((law.shares_noise && !self.has_bias()).then_some(law.samples_a_pass))
     }
 
     fn settings(&self) -> Settings {
@@ -179,31 +170,55 @@ impl<'a> Easel<'a> {
         self.info.prepare(self.gpu, uploaded, &view, &self.settings())
     }
 
-    /// Renders a picture through the scene's first camera.
+    /// Renders a picture through the scene's first camera, whose values have no noise or are not judged. Where all pixels share the noise of a pass, it is one pass.
     ///
     /// # Errors
     /// As [`Easel::prepare`] and [`Technique::step`].
     pub fn paint(&self, scene: &Scene, size: [u32; 2], spp: u32) -> Result<Painted> {
-        let easel = self.in_passes(spp)?;
-        easel.finish(easel.prepare(scene, size)?.as_mut(), spp)
+        let shared = self
+            .pass_samples()?
+            .map(|_| self.with("samples_per_pass", spp.min(PASS_SAMPLES_MAX)));
+        let easel = shared.as_ref().unwrap_or(self);
+        let painted = finish(easel.prepare(scene, size)?.as_mut(), spp)?;
+        Ok(Painted {
+            tolerance: self.tolerance(spp),
+            passes: shared.is_some().then(Vec::new),
+            ..painted
+        })
     }
 
-    /// Renders to the end what was prepared by an easel of [`in_passes`](Self::in_passes), and reads the picture.
+    /// As [`paint`](Self::paint), for pictures whose means are judged: in several passes, where all pixels share the noise of one.
+    ///
+    /// # Errors
+    /// As [`paint`](Self::paint).
+    pub fn paint_in_passes(&self, scene: &Scene, size: [u32; 2], spp: u32) -> Result<Painted> {
+        self.finish(self.prepare(scene, size)?.as_mut(), spp)
+    }
+
+    /// Renders what was prepared to the end, or to that of its [`PASSES`] where pixels share the noise of each, and reads the picture.
     pub(crate) fn finish(&self, technique: &mut dyn Technique, spp: u32) -> Result<Painted> {
+        let tolerance = self.tolerance(spp);
+        let Some(each) = self.pass_samples()? else {
+            let painted = finish(technique, spp)?;
+            return Ok(Painted { tolerance, ..painted });
+        };
+        let most = spp.min(each.saturating_mul(PASSES));
         let mut passes = Vec::new();
-        let (mut before, mut sums) = (0, [0.0; 3]);
-        while let Some(each) = self.pass_samples.filter(|_| before < spp) {
-            let now = (before + each).min(spp);
+        let (mut before, mut sums) = (0u32, [0.0; 3]);
+        loop {
+            let now = before.saturating_add(each).min(most);
             let painted = finish(technique, now)?;
             let sums_now = painted.mean().map(|(mean, _)| mean * f64::from(now));
             passes.push([0, 1, 2].map(|c| (sums_now[c] - sums[c]) / f64::from(now - before)));
             (before, sums) = (now, sums_now);
+            if now == most {
+                return Ok(Painted {
+                    tolerance,
+                    passes: Some(passes),
+                    ..painted
+                });
+            }
         }
-        Ok(Painted {
-            tolerance: self.tolerance(spp),
-            passes,
-            ..finish(technique, spp)?
-        })
     }
 
     /// Whether its pictures have a bias.
@@ -249,7 +264,7 @@ pub fn finish(technique: &mut dyn Technique, spp: u32) -> Result<Painted> {
         spp,
         counters: technique.counters(),
         tolerance: 0.0,
-        passes: Vec::new(),
+        passes: None,
     })
 }
 

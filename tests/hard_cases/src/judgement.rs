@@ -21,13 +21,16 @@ fn t_max(degrees: f64) -> f64 {
 
 /// The mean over the picture, and the most of its noise, a channel: by the variance of its pixels, or by Student's t where they share the noise of a pass.
 fn mean_and_noise(painted: &Painted) -> [(f64, f64); 3] {
-    let (n, means) = (painted.passes.len() as f64, painted.mean());
+    let means = painted.mean();
     [0, 1, 2].map(|c| {
         let (mean, variance) = means[c];
-        if painted.passes.len() < 2 {
-            return (mean, Z_MAX * variance.sqrt());
-        }
-        let values = painted.passes.iter().map(|pass| pass[c]);
+        let passes = match &painted.passes {
+            None => return (mean, Z_MAX * variance.sqrt()),
+            Some(passes) if passes.len() < 2 => return (mean, 0.0),
+            Some(passes) => passes,
+        };
+        let n = passes.len() as f64;
+        let values = passes.iter().map(|pass| pass[c]);
         let centre = values.clone().sum::<f64>() / n;
         let squares = values.map(|value| (value - centre).powi(2)).sum::<f64>();
         (mean, t_max(n - 1.0) * (squares / (n * (n - 1.0))).sqrt())
@@ -195,15 +198,23 @@ impl Judgement {
         self.none(format!("{what}: pixels that are not {expected:?}"), wrong);
     }
 
-    /// Every value is exactly this, but for techniques with a bias: these degrade as documented where up to `share` of the pixels are not.
-    pub fn exactly_unless_biased(&mut self, what: &str, painted: &Painted, expected: [f32; 3], share: f64) {
+    /// Every value is exactly this, but for techniques with a bias, and those whose light comes by walks from the lights: these degrade as documented where up
+    /// to these shares of the pixels are not.
+    pub fn exactly_unless_biased(
+        &mut self,
+        what: &str,
+        painted: &Painted,
+        expected: [f32; 3],
+        [biased, by_walks]: [f64; 2],
+    ) {
         self.sound(what, painted);
         let wrong = painted.radiance.chunks(3).filter(|pixel| *pixel != expected).count();
-        let documented = if painted.tolerance > 0.0 {
-            share * (painted.radiance.len() / 3) as f64
-        } else {
-            0.0
+        let share = match (painted.tolerance > 0.0, painted.passes.is_some()) {
+            (true, _) => biased,
+            (false, true) => by_walks,
+            (false, false) => 0.0,
         };
+        let documented = share * (painted.radiance.len() / 3) as f64;
         let what = format!("{what}: pixels that are not {expected:?}");
         self.at_most_documented(what, wrong as f64, 0.0, documented);
     }
@@ -301,7 +312,7 @@ impl Judgement {
         let exact = Painted {
             radiance: expected.to_vec(),
             variance: vec![0.0; expected.len()],
-            passes: Vec::new(),
+            passes: None,
             ..painted.clone()
         };
         self.same_expectations(what, painted, &exact)
@@ -313,7 +324,7 @@ impl Judgement {
     /// That of the z-test, for pictures of different sizes.
     pub fn same_expectations(&mut self, what: &str, painted: &Painted, other: &Painted) -> Result<()> {
         self.sound(what, painted);
-        if painted.tolerance > 0.0 || !painted.passes.is_empty() {
+        if painted.tolerance > 0.0 || painted.passes.is_some() {
             for ((mean, noise), (expected, other_noise)) in
                 mean_and_noise(painted).into_iter().zip(mean_and_noise(other))
             {

@@ -7,8 +7,9 @@
 //!
 //! # How to add a case
 //!
-//! A file in `cases/` with a constant `CASE`, and its line in [`all`]. Statistical checks reject a right picture with a probability of
-//! [`FALSE_ALARM`] each, for a driver never seen before; seeds are fixed.
+//! A file in `cases/` with a constant `CASE`, and its line in [`all`]. Pictures whose means are judged are
+//! [painted in passes](Easel::paint_in_passes). Statistical checks reject a right picture with a probability of [`FALSE_ALARM`] each, for a driver
+//! never seen before; seeds are fixed.
 
 mod cases;
 #[path = "../../../engine/src/test_chi_square.rs"]
@@ -50,6 +51,8 @@ pub struct HardCase {
     pub documented: Option<&'static str>,
     /// The same of techniques with a bias, where others do not degrade.
     pub documented_bias: Option<&'static str>,
+    /// The same of techniques without one whose light comes by walks from the lights, which all pixels of a pass share.
+    pub documented_walks: Option<&'static str>,
     /// Judges a technique; `None` for what concerns none.
     pub techniques: Option<fn(&Easel<'_>) -> Result<Judgement>>,
     /// What every ray index has to answer as a search through all triangles does.
@@ -61,7 +64,11 @@ pub struct HardCase {
 impl HardCase {
     /// How a subject may degrade.
     pub fn documented_of(&self, subject: &Subject) -> Option<&'static str> {
-        self.documented.or(self.documented_bias.filter(|_| subject.has_bias()))
+        let of_bias = self.documented_bias.filter(|_| subject.has_bias());
+        let of_walks = self
+            .documented_walks
+            .filter(|_| subject.shares_noise() && !subject.has_bias());
+        self.documented.or(of_bias).or(of_walks)
     }
 
     /// What cases take for the parts that they leave out.
@@ -72,6 +79,7 @@ impl HardCase {
         picture: || Ok(Scene::default()),
         documented: None,
         documented_bias: None,
+        documented_walks: None,
         techniques: None,
         rays: None,
         lobes: None,

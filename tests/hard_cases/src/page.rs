@@ -17,6 +17,9 @@ pub fn case_section(case: &HardCase, pictured: bool) -> String {
         .map_or(String::new(), |text| format!("\n- Degrades: {text}"))
         + &case.documented_bias.map_or(String::new(), |text| {
             format!("\n- Degrades where pictures have a bias: {text}")
+        })
+        + &case.documented_walks.map_or(String::new(), |text| {
+            format!("\n- Degrades where light comes by walks from the lights: {text}")
         });
     let picture = if pictured {
         format!("![{name}](hard-cases/{name}.png)\n\n", name = case.name)
@@ -106,7 +109,7 @@ fn remarks(rows: &[Row<'_>]) -> String {
             let Some(reason) = outcome.reason.as_deref() else {
                 continue;
             };
-            let documented = [case.documented, case.documented_bias].contains(&Some(reason));
+            let documented = [case.documented, case.documented_bias, case.documented_walks].contains(&Some(reason));
             if outcome.verdict == Verdict::Refused {
                 for reason in reason.trim_end_matches(WAY_ROUND).split("; ") {
                     add(&mut refused, format!("{}: {reason}", outcome.subject), link(case));

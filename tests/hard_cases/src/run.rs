@@ -13,8 +13,8 @@ use crate::{Easel, Figure, HardCase, INDEXES, IndexCase, Judgement, LOBES};
 /// hundredth in closed rooms.
 const PHOTONS: u32 = 1 << 14;
 const SAMPLES_PER_PASS: u32 = 1024;
-/// Walks of a pass, of techniques that have virtual lights: few, since pictures have several passes.
-const WALKS: u32 = 16;
+/// Walks of a pass, of techniques that have virtual lights: pictures have several passes.
+const WALKS: u32 = 32;
 
 /// Texels along a side of light probes, of techniques that have them, and of their finest level that is filtered: none of the cases has a sky with
 /// details.
@@ -58,6 +58,11 @@ impl Subject {
         matches!(self, Self::Technique { info, .. } if !matches!(info.bias, Bias::Unbiased))
     }
 
+    /// Whether it is a technique of whose pictures all pixels share the noise of a pass, with its defaults.
+    pub fn shares_noise(&self) -> bool {
+        matches!(self, Self::Technique { info, .. } if shares_noise(info, &Settings::default()).unwrap_or(false))
+    }
+
     /// A technique's subjects: one for each sampler that its setting `sampler` offers; those with a bias, which are not judged by their noise, and those
     /// whose pictures hold a part of the light alone, have their default sampler alone. Cards of a host's own are as good as the engine's.
     pub fn of(info: &'static Card) -> Vec<Self> {
@@ -95,8 +100,7 @@ impl Subject {
             return None;
         };
         if !self.has_bias() {
-            let shared = shares_noise(info, &Settings::default()).unwrap_or(false);
-            return Some(if shared {
+            return Some(if self.shares_noise() {
                 format!(
                     "unbiased: means over pictures have what is expected, but for their noise, by Student's t over {PASSES} passes at most; \
                      single pixels promise nothing, since all share the noise of a pass"

@@ -102,7 +102,7 @@ fn painted(value: f32) -> Painted {
         spp: 4,
         counters: std::collections::BTreeMap::new(),
         tolerance: 0.0,
-        passes: Vec::new(),
+        passes: None,
     }
 }
 
@@ -178,9 +178,11 @@ fn means_of_shared_noise_are_judged_by_their_passes() {
     // Passes that differ by 0.1 either way: 0.1 · 7.9 / √15 for 16 of them, whatever the pixels' variance says.
     let shared = |value: f32, count: usize| Painted {
         variance: vec![1e-12; 3],
-        passes: (0..count)
-            .map(|i| [f64::from(value) + 0.1 - 0.2 * (i % 2) as f64; 3])
-            .collect(),
+        passes: Some(
+            (0..count)
+                .map(|i| [f64::from(value) + 0.1 - 0.2 * (i % 2) as f64; 3])
+                .collect(),
+        ),
         ..painted(value)
     };
     for (value, right) in [(1.19, true), (1.22, false), (0.81, true), (0.78, false)] {
@@ -218,6 +220,8 @@ fn means_of_shared_noise_are_judged_by_their_passes() {
         .same_expectations("", &shared(1.31, 16), &shared(1.0, 16))
         .expect("picture")));
     assert!(passes(|j| j.uniform("", &shared(1.5, 4), [1.0; 3]).expect("picture")));
+    // Of a single pass nothing is known of the noise.
+    assert!(!passes(|j| j.mean_at_most("", &shared(1.01, 1), 1.0)));
 }
 
 #[test]

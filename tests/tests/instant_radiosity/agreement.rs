@@ -109,12 +109,12 @@ fn materials_of_all_kinds_agree_with_the_path_tracer() {
             panes.place(cuboid(name, material, lower, lower + Vec3::new(0.3, 1.2, 0.05)));
         }
         for scene in [metal, panes] {
-            let reference = traced(gpu, &scene, 4096);
+            let reference = traced(gpu, &scene, 2048);
             let settings = VirtualLightSettings {
                 bound: Bound::Geometry,
                 ..several()
             };
-            passes(gpu, &scene, &settings, PASSES).expect_same_as(&scene.name, &reference, 0.0);
+            passes(gpu, &scene, &settings, 48).expect_same_as(&scene.name, &reference, 0.0);
         }
     });
 }

@@ -90,8 +90,8 @@ fn parts_of_the_light_are_whole_with_a_compensated_bound() {
                 most_bounces,
                 ..settings()
             };
-            let found = passes(gpu, &scene, &settings, 48);
-            found.expect_same_as(set, &traced_set(gpu, &scene, 2048, set), 0.0);
+            let found = passes(gpu, &scene, &settings, 32);
+            found.expect_same_as(set, &traced_set(gpu, &scene, 1024, set), 0.0);
         }
         // Of two bounces the first surface has those of virtual lights, and no later one.
         let settings = VirtualLightSettings {

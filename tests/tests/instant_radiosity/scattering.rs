@@ -66,8 +66,8 @@ fn alpha_is_drawn_anew_for_every_place_and_pass() {
             most_bounces: 2,
             ..settings()
         };
-        let reference = traced_set(gpu, &scene, 2048, "bounces=0..2");
-        passes(gpu, &scene, &settings, 256).expect_same_as("a pane", &reference, 0.0);
+        let reference = traced_set(gpu, &scene, 1024, "bounces=0..2");
+        passes(gpu, &scene, &settings, 128).expect_same_as("a pane", &reference, 0.0);
     });
 }
 
@@ -188,7 +188,7 @@ fn ink_agrees_with_the_path_tracer() {
             samples_per_pass: 4,
             ..settings()
         };
-        passes(gpu, &scene, &settings, 64).expect_same_as(&scene.name, &traced(gpu, &scene, 4096), 0.0);
+        passes(gpu, &scene, &settings, 48).expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
     });
 }
 

@@ -345,6 +345,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/edges.rs::distances_that_are_bounded_lose_what_the_sphere_says",
             "tests/tests/twins/edges.rs::squares_have_their_form_factors",
             "tests/tests/instant_radiosity/bounds.rs::bounds_leave_out_what_they_should",
+            "tests/tests/instant_radiosity/scattering.rs::ink_agrees_with_the_path_tracer",
             "tests/tests/instant_radiosity/edge_cases.rs::pictures_do_not_depend_on_how_lights_are_shared_out",
         ],
         api: &["clerestory::transport::edge_bound"],

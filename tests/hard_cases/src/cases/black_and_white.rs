@@ -49,13 +49,13 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         specular_color: Vec3::ZERO,
         ..Material::default()
     };
-    let painted = easel.paint(&floor_in_furnace(metal, quarter, 1.0), SMALL, 16)?;
+    let painted = easel.paint_in_passes(&floor_in_furnace(metal, quarter, 1.0), SMALL, 16)?;
     judgement.mean_at_most("black metal", &painted, 1.0);
     for (what, material) in [
         ("white floor", Material::lambert("white", Vec3::ONE)),
         ("white metal", Material::default()),
     ] {
-        let painted = easel.paint(&floor_in_furnace(material, quarter, 1.0), SMALL, 64)?;
+        let painted = easel.paint_in_passes(&floor_in_furnace(material, quarter, 1.0), SMALL, 64)?;
         judgement.mean(what, &painted, [1.0; 3], TABLE_LOSS)?;
     }
     let closed = load("builtin:furnace-box?rho=1&emission=0.01")?;

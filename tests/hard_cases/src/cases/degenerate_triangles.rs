@@ -63,7 +63,7 @@ fn scene() -> Result<Scene> {
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     let scene = scene()?;
-    let painted = easel.calm().paint(&scene, SMALL, 64)?;
+    let painted = easel.calm().paint_in_passes(&scene, SMALL, 64)?;
     judgement.uniform("furnace", &painted, [1.0; 3])?;
     let wanted = scene.meshes.iter().map(unmeetable).sum::<u64>();
     let left_out = easel.upload(&scene)?.index_statistics().excluded_degenerate;

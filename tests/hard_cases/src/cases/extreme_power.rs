@@ -44,7 +44,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     for factor in [1e-12f32, 1e12] {
         let mut scene = furnace()?;
         scene.materials[0].emission = Vec3::splat(0.5 * factor);
-        let painted = easel.calm().paint(&scene, SMALL, 64)?;
+        let painted = easel.calm().paint_in_passes(&scene, SMALL, 64)?;
         judgement.uniform(&format!("furnace times {factor:e}"), &painted, [f64::from(factor); 3])?;
     }
     Ok(judgement)

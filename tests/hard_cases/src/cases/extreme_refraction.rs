@@ -63,7 +63,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         ("rough, index 100", glass("dense", 100.0, 0.1)),
         ("ink", ink),
     ] {
-        let painted = easel.calm().paint(&white_furnace(material)?, SMALL, 64)?;
+        let painted = easel.calm().paint_in_passes(&white_furnace(material)?, SMALL, 64)?;
         judgement.mean_at_most(what, &painted, 1.0 + TABLE_GAIN);
     }
     let painted = easel.paint(&white_furnace(glass("air", 1.0, 0.0))?, SMALL, 16)?;

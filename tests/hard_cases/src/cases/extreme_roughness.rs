@@ -40,7 +40,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
             let mut scene = white_furnace((lobe.material)(roughness))?;
             // Flat: interpolated normals send some directions below the surface, where they are lost.
             scene.meshes[0].normals.clear();
-            let painted = easel.calm().paint(&scene, SMALL, 32)?;
+            let painted = easel.calm().paint_in_passes(&scene, SMALL, 32)?;
             let what = format!("{} of roughness {roughness}", lobe.name);
             judgement.mean_at_most(&what, &painted, 1.0 + TABLE_GAIN);
             if let Some(loss) = lobe.loss(roughness) {

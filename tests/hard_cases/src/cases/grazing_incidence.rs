@@ -51,7 +51,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         for roughness in [0.0, 0.0317, 0.1] {
             let material = (lobe.material)(roughness);
             let single = lobes::single_scattering_loss(&material, elevation.sin());
-            let painted = easel.paint(&floor_in_furnace(material, elevation, 0.01), SMALL, 64)?;
+            let painted = easel.paint_in_passes(&floor_in_furnace(material, elevation, 0.01), SMALL, 64)?;
             let what = format!("{} of roughness {roughness}", lobe.name);
             judgement.mean_at_most(&what, &painted, 1.0 + TABLE_GAIN);
             if let Some(loss) = lobe.loss(roughness) {

@@ -56,7 +56,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let radiance: Vec<f32> = (averages.iter())
         .flat_map(|e| [(f64::from(RHO) * e / std::f64::consts::PI) as f32; 3])
         .collect();
-    let painted = easel.paint(&scene, [SIZE; 2], 256)?;
+    let painted = easel.paint_in_passes(&scene, [SIZE; 2], 256)?;
     judgement.pixels("sum of the laws", &painted, &radiance)?;
     Ok(judgement)
 }

@@ -47,7 +47,7 @@ pub(super) fn ball(sigma: f32, phase: Phase) -> Result<Scene> {
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     for sigma in [1e-4, 1.0, 30.0] {
-        let painted = easel.paint(&ball(sigma, Phase::Isotropic)?, SMALL, 64)?;
+        let painted = easel.paint_in_passes(&ball(sigma, Phase::Isotropic)?, SMALL, 64)?;
         judgement.mean(&format!("optical radius {sigma:e}"), &painted, [1.0; 3], 0.0)?;
     }
     // So dense that few paths come back before roulette ends them; those that do carry much: the mean is not near to normal.

@@ -32,7 +32,7 @@ fn scene(height: f64, sigma: f32) -> Scene {
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     for (height, sigma) in [(1e4, 1e-4f32), (1.0, 1.0), (1e-4, 1e4), (1e-4, 1e-4), (10.0, 0.3)] {
-        let painted = easel.paint(&scene(height, sigma), SMALL, 64)?;
+        let painted = easel.paint_in_passes(&scene(height, sigma), SMALL, 64)?;
         let expected = (-f64::from(sigma) * height).exp();
         judgement.mean(
             &format!("{sigma:e} per metre over {height:e} m"),

@@ -73,7 +73,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut seen = |what: &str, densities: &[f32], height: f32, depth: f64| {
         let mean = densities.iter().map(|d| f64::from(*d)).sum::<f64>() / densities.len() as f64;
         let sigma = depth / (mean * f64::from(height));
-        let painted = easel.paint(&column(densities, height, sigma as f32, 1.0), SMALL, 64)?;
+        let painted = easel.paint_in_passes(&column(densities, height, sigma as f32, 1.0), SMALL, 64)?;
         judgement.mean(what, &painted, [(-depth).exp(); 3], 0.0)
     };
     seen("one cell", &[1.0], 1.0, 1.0)?;
@@ -90,7 +90,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut furnace = column(&layer(20), 1.0, 0.0, 1.0);
     furnace.media[0].sigma_s = Vec3::splat(3.0);
     furnace.environment = Some(Environment::uniform(Vec3::ONE));
-    let painted = easel.paint(&furnace, SMALL, 64)?;
+    let painted = easel.paint_in_passes(&furnace, SMALL, 64)?;
     judgement.mean("a scattering layer in a furnace", &painted, [1.0; 3], 0.0)?;
     Ok(judgement)
 }

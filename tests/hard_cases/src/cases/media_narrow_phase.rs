@@ -23,7 +23,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
             ("Henyey–Greenstein", Phase::HenyeyGreenstein { g }),
             ("Schlick", Phase::Schlick { k: g }),
         ] {
-            let painted = easel.paint(&ball(10.0, phase)?, SMALL, 32)?;
+            let painted = easel.paint_in_passes(&ball(10.0, phase)?, SMALL, 32)?;
             judgement.mean(&format!("{what} {g}"), &painted, [1.0; 3], 0.0)?;
         }
     }

@@ -78,15 +78,15 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         transform: glam::DAffine3::from_scale(DVec3::splat(0.6)),
         name: "inner".into(),
     });
-    let painted = easel.paint(&furnace, SMALL, 64)?;
+    let painted = easel.paint_in_passes(&furnace, SMALL, 64)?;
     judgement.mean("sphere in a sphere", &painted, [1.0; 3], 1e-5)?;
 
     // R of one face in air; the outer slab alone has its multiple reflections summed.
     let r = 0.04;
     let (one, two) = ((1.0 - r) / (1.0 + r), (1.0 - r) / (1.0 + 3.0 * r));
-    let painted = easel.paint(&slabs(1.0), SMALL, 1024)?;
+    let painted = easel.paint_in_passes(&slabs(1.0), SMALL, 1024)?;
     judgement.uniform("inner slab of relative index 1", &painted, [one; 3])?;
-    let painted = easel.paint(&slabs(1.5), SMALL, 1024)?;
+    let painted = easel.paint_in_passes(&slabs(1.5), SMALL, 1024)?;
     judgement.mean_documented(
         "inner slab of absolute index 1.5",
         &painted,
@@ -100,7 +100,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         attenuation_distance: 0.2,
         ..Material::glass("outer", 1.0)
     };
-    let painted = easel.paint(&slab_in(ink, 1.0), SMALL, 64)?;
+    let painted = easel.paint_in_passes(&slab_in(ink, 1.0), SMALL, 64)?;
     judgement.mean("clear slab in ink", &painted, [0.25; 3], 0.0)?;
     Ok(judgement)
 }

@@ -45,7 +45,7 @@ fn scene() -> Scene {
 
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut judgement = Judgement::default();
-    let painted = easel.paint(&scene(), SMALL, 64)?;
+    let painted = easel.paint_in_passes(&scene(), SMALL, 64)?;
     judgement.mean("share of the picture", &painted, [0.125, 0.25, 0.375], 0.0)?;
     // A 16 × 16 picture of [−1, 1]²: the triangle lies in the upper right quarter, below its diagonal.
     let outside = |i: usize| i % 16 < 8 || i / 16 >= 8;

@@ -49,10 +49,8 @@ pub(super) const CASE: HardCase = HardCase {
 };
 
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
-    const SPP: u32 = 16;
     let mut judgement = Judgement::default();
     let scene = furnace()?;
-    let easel = easel.in_passes(SPP)?;
     let mut technique = easel.prepare(&scene, [8, 8])?;
     let target = DVec3::new(0.1, 0.2, -0.3);
     let places = [
@@ -66,7 +64,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     ];
     for (what, eye, target) in places {
         technique.set_camera(&Camera::look_at(what, eye, target, DVec3::Y, 1.0))?;
-        let painted = easel.finish(technique.as_mut(), SPP)?;
+        let painted = easel.finish(technique.as_mut(), 16)?;
         judgement.mean_at_most(what, &painted, 1.0);
     }
     Ok(judgement)

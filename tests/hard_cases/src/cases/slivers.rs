@@ -73,7 +73,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         material: Some(0),
         ..Mesh::default()
     });
-    let painted = easel.calm().paint(&room, SMALL, 64)?;
+    let painted = easel.calm().paint_in_passes(&room, SMALL, 64)?;
     judgement.uniform("furnace with slivers", &painted, [1.0; 3])?;
     Ok(judgement)
 }
