@@ -162,7 +162,7 @@ fn every_method_agrees_with_its_twin_and_repeats_its_bits() {
             );
             let off = share_that_differs(&image, &rays, &hits, &settings);
             println!("{method}: {:.2} % differ from the twin", 100.0 * off);
-            assert!(off < 0.05, "{method}: {off}");
+            assert!(off < 0.01, "{method}: {off}");
             for (ray, hit) in rays.iter().zip(&hits).rev().take(3) {
                 let twin = image.search(ray, &settings);
                 assert!(

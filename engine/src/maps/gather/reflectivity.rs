@@ -10,11 +10,12 @@ use crate::{Error, Result};
 /// Rings of a cone, and points of a half ring.
 const RINGS: u32 = 64;
 const POINTS: u32 = 32;
-/// Greatest exponent of a lobe. Rows of the table are 1.8° apart about the lobe's axis: its light over all directions is 1 within a hundredth.
+/// Greatest exponent of a lobe, whose rows are 1.8° apart about its axis.
 const MAX_EXPONENT: f64 = 64.0;
 
 /// Means of a normalised lobe over cones, by the cosine of the cone's half angle and by half the distance of two points on the unit sphere, √((1 − c)/2) of
-/// the cosine c of the cone's axis with the lobe's: evenly fine in angle about the lobe's axis.
+/// the cosine c of the cone's axis with the lobe's: evenly fine in angle about the lobe's axis. Each size of cone has the integral 1 over all axes, linear between
+/// rows, so that what lines add between entries of narrow lobes is not there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reflectivity {
     exponent: f64,
@@ -59,6 +60,14 @@ pub fn cone_reflectivity(exponent: f64, cone: f64, axis: f64) -> f64 {
     norm * sum / whole
 }
 
+/// What a row counts in the integral over all axes of a function that is linear between rows 0 to `last`: solid angle grows by 8π u du with u the row over
+/// `last`.
+fn axis_weight(row: f64, last: f64) -> f64 {
+    let below = if row > 0.0 { row / 2.0 - 1.0 / 6.0 } else { 0.0 };
+    let above = if row < last { row / 2.0 + 1.0 / 6.0 } else { 0.0 };
+    4.0 * TAU * (below + above) / (last * last)
+}
+
 impl Reflectivity {
     /// The table of an exponent.
     ///
@@ -73,11 +82,22 @@ impl Reflectivity {
         let last = f64::from(side - 1);
         let value = |i: u32| {
             let (cone, apart) = (f64::from(i % side) / last, f64::from(i / side) / last);
-            cone_reflectivity(exponent, cone, 1.0 - 2.0 * apart * apart) as f32
+            cone_reflectivity(exponent, cone, 1.0 - 2.0 * apart * apart)
         };
+        let mut values: Vec<f64> = (0..side * side).map(value).collect();
+        let side = side as usize;
+        for cone in 0..side {
+            let of_cone = (0..side).map(|row| axis_weight(row as f64, last) * values[row * side + cone]);
+            let whole: f64 = of_cone.sum();
+            values
+                .iter_mut()
+                .skip(cone)
+                .step_by(side)
+                .for_each(|value| *value /= whole);
+        }
         Ok(Self {
             exponent,
-            values: (0..side * side).map(value).collect(),
+            values: values.into_iter().map(|value| value as f32).collect(),
         })
     }
 

@@ -80,7 +80,7 @@ fn zero_vectors_and_numbers_that_are_none_find_nothing() {
             ray([f64::NAN, 0.0, 0.0], [1.0, 0.0, 0.0]),
             ray([f64::INFINITY, 0.0, 0.0], [1.0, 0.0, 0.0]),
             ray([1e200, 0.0, 0.0], [1.0, 0.0, 0.0]),
-            ray([0.0, -1e16, 0.0], [1.0, 0.0, 0.0]),
+            ray([0.0, -2e16, 0.0], [1.0, 0.0, 0.0]),
             ImpostorRay {
                 origin: DVec3::ZERO,
                 direction: DVec3::NAN,

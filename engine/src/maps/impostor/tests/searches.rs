@@ -145,7 +145,7 @@ fn the_first_crossing_errs_as_published() {
         .map(|settings| [ShinySphere::P1, ShinySphere::P2].map(|sphere| all_and_seen(&sphere, &settings, 1)[0].mean()));
     println!("to a surface {march:?}, to the first crossing {first:?}");
     assert!(
-        march[0] > 1.3 * first[0] && march[1] < 0.8 * first[1],
+        march[0] > 1.3 * first[0] && march[1] < 0.95 * first[1],
         "{march:?} {first:?}"
     );
 }

@@ -69,11 +69,11 @@ const CRITERIA: &[Criterion<Row>] = &[
     .among(|row| row.place == HALF_WAY && row.form == name(SolidAngleForm::Disc) && row.side >= 16),
     Criterion::each(
         "with normals it vanishes: RMS half-way to a wall, 64 texels (%)",
-        Bound::AtMost(0.144),
+        Bound::AtMost(0.06),
         |row: &Row| row.rms.into(),
     )
     .among(|row| row.place == HALF_WAY && row.form == name(SolidAngleForm::DiscWithNormals) && row.side == 64)
-    .because("a fifth more than the published 0.12 %"),
+    .because("half of the published 0.12 %, most of which is the error of its reference"),
 ];
 
 fn name(form: SolidAngleForm) -> String {
