@@ -88,7 +88,8 @@ float environment_emission_pdf(uint base, uvec2 size, vec3 w) {
     float rim = 0.5 * dot(w.xz, w.xz) / (1.0 + (south ? -w.y : w.y));
     float from_rim = clamp((rim - rims.x) / (rims.y - rims.x), 0.0, 1.0);
     vec4 luminances = environment_luminances(environment_corners(cell, size), 0.0);
-    vec2 sides = environment_sides(luminances, south ? 1.0 - from_rim : from_rim);
+    float down = south ? 1.0 - from_rim : from_rim;
+    vec2 sides = environment_sides(luminances, down);
     uvec2 grid = uvec2(size.x, size.y + 1u);
     float probability = distribution_probability(base, cell.y) * distribution_probability(distribution_row_base(base, grid, cell.y), cell.x);
     float solid_angle = 4.0 * PI * (rims.y - rims.x) / float(size.x);

@@ -23,7 +23,7 @@ use glam::{DAffine3, DVec3, Vec3};
 const SIDE: u32 = 12;
 const SIZE: [u32; 2] = [SIDE; 2];
 /// Blocks of passes.
-const BLOCKS: u32 = 16;
+const BLOCKS: u32 = 8;
 
 /// Independent samples, some light subpaths a pixel.
 fn settings() -> BidirectionalSettings {

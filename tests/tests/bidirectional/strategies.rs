@@ -2,11 +2,14 @@
 
 use super::*;
 use clerestory::scene::{Camera, Environment};
+use clerestory_tests::render::{camera_aslant, floor};
 
 /// Of light that is scattered exactly so often.
 fn alone(strategies: Strategies, bounces: u32) -> BidirectionalSettings {
     BidirectionalSettings {
         strategies,
+        // Some of which meet every pixel.
+        light_paths: 1024,
         least_bounces: bounces,
         most_bounces: Some(bounces),
         ..settings()
@@ -17,17 +20,26 @@ fn alone(strategies: Strategies, bounces: u32) -> BidirectionalSettings {
 #[test]
 fn each_way_to_make_a_path_finds_the_same_light() {
     with_gpu(|gpu| {
-        let mut lit = room();
+        // A sphere, where no two points of the shell are nearer than others to each other but by the cosines.
+        let mut lit = builtin("builtin:sphere-light?rho=0.5&frequency=12&light=area&radius=0.4");
         lit.name = "lamp".into();
-        add_lamp(&mut lit, 3.0);
-        // A coat that is rough, and a metal.
-        lit.materials[1].specular = 1.0;
-        lit.materials[1].roughness = 0.6;
-        let mut sky = builtin("builtin:materials?slices=8");
-        sky.name = "sky".into();
-        let matte = sky.add_material(Material::lambert("matte", Vec3::new(0.6, 0.5, 0.4)));
-        sky.meshes.iter_mut().for_each(|mesh| mesh.material = Some(matte));
-        sky.cameras[0].lens_radius = 0.0;
+        // Coated, and rough.
+        lit.materials[0].specular = 1.0;
+        lit.materials[0].roughness = 0.6;
+        // A block on a floor, under a sky that is brighter on one side.
+        let mut sky = Scene {
+            name: "sky".into(),
+            ..Scene::default()
+        };
+        let matte = sky.add_material(Material::lambert("matte", Vec3::new(0.8, 0.7, 0.6)));
+        sky.place(floor("floor", matte, 1.0, 0.0));
+        sky.place(cuboid(
+            "block",
+            matte,
+            Vec3::new(-0.3, 0.001, -0.3),
+            Vec3::new(0.2, 0.4, 0.1),
+        ));
+        sky.cameras.push(camera_aslant());
         sky.environment = Some(Environment {
             width: 2,
             height: 1,

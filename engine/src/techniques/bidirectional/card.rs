@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::mis;
 use super::renderer::BidirectionalPaths;
 use super::settings::BidirectionalSettings;
 use crate::Result;
@@ -26,7 +27,7 @@ use crate::transport::{PathSet, SURFACE_FEATURES};
 pub(in crate::techniques) const CARD: Card = Card {
     id: "bdpt",
     summary: "bidirectional path tracing: paths made from both ends in every way, weighted by the balance heuristic",
-    rows: &[ROWS],
+    rows: &[ROWS, mis::ROWS],
     bias: BIAS,
     needs: &[],
     kernels: &[&KERNELS],
@@ -170,18 +171,21 @@ const ROWS: &[Row] = &[
             sources::GEORGIEV_2012.whole(),
             sources::DAVIDOVIC_2014.at("§4: a cache of light vertices"),
         ],
-        shaders: &["shaders/techniques/bidirectional/", "shaders/walk/"],
+        shaders: &[
+            "shaders/techniques/bidirectional/",
+            "shaders/techniques/path/path_camera.comp",
+            "shaders/techniques/path/path_resolve.comp",
+            "shaders/walk/",
+        ],
         path_set: Some("all"),
         bias: Some(BIAS),
         tests: &[
-            "engine/src/techniques/bidirectional/mis.rs::weights_are_those_of_the_balance_heuristic_and_sum_to_one",
-            "tests/tests/twins/lights.rs::partial_weights_agree_with_their_twins",
+            "tests/tests/bidirectional/agreement.rs::lights_in_a_lambert_sphere_fill_it_evenly",
             "tests/tests/bidirectional/agreement.rs::lamps_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::lights_without_area_and_skies_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
-            "tests/tests/bidirectional/strategies.rs::each_way_to_make_a_path_finds_the_same_light",
             "tests/tests/bidirectional/edge_cases.rs::pictures_do_not_depend_on_how_the_work_is_cut_up",
-            "tests/tests/bidirectional/edge_cases.rs::threads_of_the_driver_never_show",
+            "tests/tests/bidirectional/edge_cases.rs::scenes_without_lights_or_reflection_have_nothing_to_join",
             "tests/tests/bidirectional/edge_cases.rs::what_cannot_be_modelled_is_refused_by_name",
         ],
         api: &["clerestory::techniques::bidirectional::BidirectionalPaths"],

@@ -7,6 +7,8 @@
 //!
 //! Densities are per solid angle; cosines are those to the geometric normal, and positive.
 
+use crate::catalogue::{Bias, Role, Row, sources};
+
 /// Of a subpath: weights of the other ways to make it, relative to that by which it was made, but for densities that its next edge decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartialWeights {
@@ -51,6 +53,28 @@ impl PartialWeights {
 pub fn mis_weight(to_light: f64, to_eye: f64) -> f64 {
     1.0 / (1.0 + to_light + to_eye)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[Row {
+    id: "CL-BDPT-WEIGHTS",
+    name: "balance heuristic over all ways to make a path from both ends, by two partial weights a subpath",
+    role: Role::PartOf("CL-BDPT"),
+    limits: "Weights of paths with a few samples of one way and many of another count each way once, but for light subpaths that meet the camera.",
+    sources: &[sources::GEORGIEV_2012.whole(), sources::VEACH_1997.at("9.2.2 and 10.2")],
+    shaders: &[
+        "shaders/techniques/bidirectional/bdpt_mis.glsl",
+        "shaders/techniques/bidirectional/bdpt_both_ways.glsl",
+    ],
+    bias: Some(Bias::Unbiased),
+    tests: &[
+        "engine/src/techniques/bidirectional/mis.rs::weights_are_those_of_the_balance_heuristic_and_sum_to_one",
+        "engine/src/techniques/bidirectional/mis.rs::behind_mirrors_only_joints_before_them_count",
+        "tests/tests/twins/lights.rs::partial_weights_agree_with_their_twins",
+        "tests/tests/bidirectional/strategies.rs::each_way_to_make_a_path_finds_the_same_light",
+    ],
+    api: &["clerestory::techniques::bidirectional::mis"],
+    ..Row::of(file!())
+}];
 
 #[cfg(test)]
 mod tests {
