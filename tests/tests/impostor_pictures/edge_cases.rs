@@ -81,6 +81,12 @@ fn what_cannot_be_is_refused_by_name() {
                 "scatter light once",
             );
         }
+        refused(
+            &scene,
+            "impostor",
+            json!({"bounces": 0, "capture": "raster"}),
+            "scatter light once",
+        );
         refused(&scene, "impostor", json!({"reflector": 99}), "reflector");
         refused(&scene, "impostor", json!({"reflector": 0}), "without smooth surface");
         refused(&scene, "impostor", json!({"method": "march", "steps": 0}), "steps");

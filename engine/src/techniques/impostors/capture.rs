@@ -38,7 +38,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaptureBy {
-    /// By rasterization where points, spots and directions alone emit light, by rays elsewhere.
+    /// By rasterization where points and spots alone emit light and nothing is there in part, by rays elsewhere.
     #[default]
     Auto,
     /// By rasterization with shadow maps: light of points, spots and directions, scattered once.
@@ -70,16 +70,18 @@ impl CaptureBy {
                 "the environment's light is not brought to surfaces of a rasterized map; capture by rays does",
             ),
             (
-                most_bounces > 1,
-                "surfaces of a rasterized map scatter light once; capture by rays scatters it more often",
+                most_bounces != 1,
+                "surfaces of a rasterized map scatter light once; capture by rays scatters it as often as is asked for",
             ),
             (
                 placed > SHADOW_MAPS_MAX as usize || placed + profile.lights.directional > LIGHTS_MAX,
                 "there are more lights than rasterized maps have; capture by rays takes all",
             ),
         ]);
+        // What it draws otherwise than it is.
+        let is_off = profile.lights.directional > 0 || profile.alpha.blend;
         match self {
-            Self::Auto if reasons.is_empty() => Ok(Self::Raster),
+            Self::Auto if reasons.is_empty() && !is_off => Ok(Self::Raster),
             Self::Auto => Ok(Self::Rays),
             Self::Raster if !reasons.is_empty() => Err(Error::Unsupported {
                 technique: technique.into(),
