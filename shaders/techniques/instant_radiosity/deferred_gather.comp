@@ -21,7 +21,7 @@ layout(local_size_x = 64) in;
 
 layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;  // of a place, in a dispatch
 layout(constant_id = 143) const uint VISIBILITY = VISIBILITY_RAYS;
-layout(constant_id = 144) const bool KEEPS_COLORS = false;  // by which a filter parts what it averages from what it does not
+layout(constant_id = 144) const bool KEEPS_COLORS = false;  // by which a filter divides light before it averages it
 
 layout(push_constant, scalar) uniform Push {
     SeenFrom seen;
@@ -47,6 +47,7 @@ layout(push_constant, scalar) uniform Push {
 layout(set = 0, binding = 0) uniform utextureBuffer virtual_light_texels;
 
 #include "techniques/instant_radiosity/connection.glsl"
+#include "transport/microfacet_albedo.glsl"
 
 layout(set = 0, binding = 1, scalar) restrict readonly buffer SplitPlaces { SplitPlace split_places[]; };
 layout(set = 0, binding = 2, scalar) restrict buffer SplitStates { GatherState split_states[]; };
@@ -126,6 +127,20 @@ void gather(Receiver r, uint end, inout GatherState at, out uint tests) {
     } while (!stopped && at.light < last);
 }
 
+// Albedo towards the eye of all that virtual lights light, which their light is divided by before it is averaged with that of neighbours.
+vec3 scattered_color(Receiver r) {
+    Bsdf b = r.arrival.bsdf;
+    float cos_o = abs(r.frame.wo.z);
+    vec3 color = cosine_lobes(b, cos_o, false, LOBE_DIFFUSE | LOBE_GLOSSY).seen;
+    if (!bsdf_is_delta(b)) {
+        color += microfacet_albedo(b, cos_o);
+        if (HAS_TRANSMISSION) {
+            color += (1.0 - bsdf_metallic(b)) * bsdf_transmission(b) * b.base_color;
+        }
+    }
+    return color;
+}
+
 void main() {
     uint place = push.first_place + invocation_index();
     if (place >= push.end_place) {
@@ -150,7 +165,7 @@ void main() {
     gather(r, end, at, tests);
     split_states[place] = at;
     if (KEEPS_COLORS) {
-        split_colors[place] = cosine_lobes(r.arrival.bsdf, 1.0, false, LOBE_DIFFUSE).diffuse;
+        split_colors[place] = scattered_color(r);
     }
     COUNT_WIDE(connections, at.light - first)
     COUNT_WIDE(tests, tests)

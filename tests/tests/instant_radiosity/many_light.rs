@@ -474,6 +474,61 @@ fn filters_average_what_lies_in_one_plane_alone() {
     });
 }
 
+/// The floor of [`terrace`] alone, its halves of two materials.
+fn halves(materials: [Material; 2]) -> Scene {
+    let mut scene = terrace();
+    scene.name = "halves".into();
+    scene.instances.pop();
+    scene.instances.remove(0);
+    for (material, x) in materials.into_iter().zip([-3.0, 0.0]) {
+        let material = scene.add_material(material);
+        let lower = Vec3::new(x, -1.0, -3.0);
+        scene.place(cuboid("half", material, lower, lower + Vec3::new(3.0, 1.0, 6.0)));
+    }
+    scene
+}
+
+#[test]
+fn filters_divide_by_all_that_a_surface_scatters() {
+    const SIDE: usize = 24;
+    with_gpu(|gpu| {
+        // Mean of each half with a filter over that without.
+        let ratios = |scene: &Scene| {
+            let means = [true, false].map(|filter| {
+                let settings = ManyLightSettings {
+                    lights: 32,
+                    filter,
+                    filter_normal: 0.9,
+                    whole_sets: true,
+                    ..exact()
+                };
+                let radiance = picture(gpu, scene, [SIDE as u32; 2], &of(INDIRECT, settings), 1);
+                [0, SIDE / 2].map(|first| -> f32 {
+                    let columns = (0..SIDE).flat_map(|y| (first..first + SIDE / 2).map(move |x| 3 * (SIDE * y + x)));
+                    columns.map(|i| radiance[i]).sum()
+                })
+            });
+            println!("{means:?}");
+            [0, 1].map(|half| (means[0][half], means[0][half] / means[1][half]))
+        };
+        let coated = |albedo| Material {
+            specular: 1.0,
+            roughness: 1.0,
+            ..Material::lambert("coated", Vec3::splat(albedo))
+        };
+        for (_, ratio) in ratios(&halves([0.8, 0.003].map(coated))) {
+            assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+        }
+        let metal = |roughness| Material {
+            metallic: 1.0,
+            roughness,
+            ..Material::lambert("metal", Vec3::new(0.9, 0.6, 0.2))
+        };
+        let [(_, rough), (mirror, _)] = ratios(&halves([0.6, 0.0].map(metal)));
+        assert!((rough - 1.0).abs() < 0.1 && mirror == 0.0, "{rough} {mirror}");
+    });
+}
+
 #[test]
 fn filtered_tiles_are_nearly_what_all_lights_bring() {
     with_gpu(|gpu| {

@@ -262,7 +262,7 @@ const ROWS: &[Row] = &[
         id: "SVO-P14",
         name: "filter of interleaved light over neighbours in the same plane with the same normal",
         role: Role::PartOf("SVO-P12"),
-        limits: "Blurs contact shadows, and highlights of glossy surfaces, by as many pixels as there are tiles along a side; single pixels without neighbours keep their pattern.",
+        limits: "Blurs contact shadows, and highlights of glossy surfaces, by as many pixels as there are tiles along a side, and surfaces of one height that lie apart but are neighbours in the picture; single pixels without neighbours keep their pattern.",
         sources: &[sources::LAINE_2007.whole(), sources::SUN_2015.at("§4.12")],
         shaders: &["shaders/techniques/instant_radiosity/deferred_merge.comp"],
         bias: Some(Bias::Biased(
@@ -270,6 +270,7 @@ const ROWS: &[Row] = &[
         )),
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::filters_average_what_lies_in_one_plane_alone",
+            "tests/tests/instant_radiosity/many_light.rs::filters_divide_by_all_that_a_surface_scatters",
             "tests/tests/instant_radiosity/many_light.rs::filtered_tiles_are_nearly_what_all_lights_bring",
         ],
         settings: &["filter", "filter_plane", "filter_normal"],
