@@ -136,7 +136,7 @@ impl GatherLights {
     }
 
     /// As [`GatherLights::new`], with lights where they were published to be: at the mean of all distances in the direction of the texel's middle, with the mean
-    /// radiance of equal weights. Over planes they lie off them; over silhouettes they are where [`GatherLights::new`] has them too.
+    /// radiance of equal weights. Over planes they lie off them, over silhouettes between what is near and what is far as well.
     ///
     /// # Errors
     /// As [`GatherLights::new`].

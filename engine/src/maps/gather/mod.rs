@@ -141,7 +141,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-G7",
         name: "the five greatest terms of a glossy gather, scaled to the whole",
         role: Role::PartOf("MET-G3"),
-        limits: "Of use where five texels hold most of the lobe: more texels are worse then.",
+        limits: "Of use where five texels hold most of the lobe, not of finer maps.",
         sources: &[sources::SZIRMAY_KALOS_LAZANYI_2006.whole()],
         shaders: &["shaders/maps/gather.glsl"],
         bias: Some(Bias::Biased(
