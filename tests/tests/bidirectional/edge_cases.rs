@@ -29,7 +29,7 @@ fn pictures_do_not_depend_on_how_the_work_is_cut_up() {
         // Pixels that fill no workgroup.
         let base = BidirectionalSettings {
             light_paths: 300,
-            samples_per_pass: 4,
+            samples_at_once: 4,
             connections: 3,
             ..settings()
         };

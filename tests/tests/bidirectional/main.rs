@@ -28,7 +28,7 @@ const BLOCKS: u32 = 8;
 fn settings() -> BidirectionalSettings {
     BidirectionalSettings {
         light_paths: 256,
-        samples_per_pass: 16,
+        samples_at_once: 16,
         sampler: SamplerKind::Pcg,
         seed: 11,
         ..BidirectionalSettings::default()

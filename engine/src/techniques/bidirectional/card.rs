@@ -210,7 +210,7 @@ const ROWS: &[Row] = &[
             "tests/tests/bidirectional/strategies.rs::light_subpaths_meet_cameras_of_all_kinds",
             "tests/tests/bidirectional/edge_cases.rs::threads_of_the_driver_never_show",
         ],
-        ..Row::of("engine/src/techniques/bidirectional/light_paths.rs")
+        ..Row::of("engine/src/techniques/bidirectional/splats.rs")
     },
 ];
 

@@ -68,7 +68,8 @@ impl Cursor {
         let bands = film.bands();
         let band = &bands[c.band];
         if c.band == 0 && c.in_band == 0 {
-            c.samples = (each - c.sample % each).min(wanted.saturating_sub(c.sample)).max(1);
+            let left = wanted.saturating_sub(c.sample);
+            c.samples = (each - c.sample % each).min(left).clamp(1, slots);
         }
         let pixels = (band.pixels() - c.in_band).min(slots / c.samples);
         let wave = EyeWave {
@@ -113,14 +114,14 @@ impl EyeMemory {
         })
     }
 
-    /// Memory for as many slots as there is room for, up to what a picture of so many pixels fills.
+    /// Memory for as many slots as there is room for, up to what a pass of so many paths fills.
     ///
     /// # Errors
     /// As [`WaveBuffers::within_memory`].
     pub fn within(
         gpu: &Gpu,
         scene: &GpuScene,
-        pixels: u32,
+        paths: u32,
         settings: &BidirectionalSettings,
     ) -> Result<(WaveBuffers, Self)> {
         let needs = WaveNeeds {
@@ -132,7 +133,6 @@ impl EyeMemory {
             0 => default_slots(gpu),
             wanted => wanted,
         };
-        let paths = pixels.saturating_mul(settings.pass_of(pixels)[0]);
         let slots = wanted
             .min(paths)
             .max(1)

@@ -6,16 +6,15 @@
 use std::sync::Arc;
 
 use super::eye::EyeWave;
-use super::kernels::{Counters, Counts, check_sweeps, quota_of, rays_of_submission, set_of, work};
+use super::kernels::{Counters, Counts, check_sweeps, rays_of_submission, set_of, work};
 use super::settings::BidirectionalSettings;
+use super::splats::{Shown, ShownWalks, camera_pipeline, fits, splats};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{LIGHT_VERTEX_QUARTERS, WALK_GROUP};
 use crate::gpu::shaders::sets::{BidirectionalSet, WaveSet};
-use crate::gpu::shaders::techniques::bidirectional::{
-    bdpt_add, bdpt_append, bdpt_camera, bdpt_emit, bdpt_scatter, bdpt_splat,
-};
-use crate::gpu::shaders::types::{LightSplat, PartialWeights, SplatSum};
+use crate::gpu::shaders::techniques::bidirectional::{bdpt_add, bdpt_append, bdpt_emit, bdpt_scatter, bdpt_splat};
+use crate::gpu::shaders::types::PartialWeights;
 use crate::gpu::{
     Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
 };
@@ -92,18 +91,6 @@ struct Kit {
     group: u32,
     seed: u32,
     last_bounce: u32,
-}
-
-/// What the camera is shown.
-struct Shown {
-    pipeline: ComputePipeline<bdpt_camera::Kernel>,
-    splat: ComputePipeline<bdpt_splat::Kernel>,
-    add: ComputePipeline<bdpt_add::Kernel>,
-    splats: Buffer,
-    sums: Buffer,
-    frame: CameraFrame,
-    size: [u32; 2],
-    bounces: [u32; 2],
 }
 
 struct LightStages<'a> {
@@ -324,8 +311,13 @@ impl LightPaths {
             return Ok(Vec::new());
         };
         let end = shown.saturating_add(self.rays_at_once).min(self.vertices);
-        let push = camera.push(&self.kit, pass, [shown, end], sweeps > 0);
-        let (set, scene) = (camera.set(&self.kit), &self.kit.scene);
+        let walks = ShownWalks {
+            pass,
+            group: self.kit.group,
+            seed: self.kit.seed,
+        };
+        let (set, scene) = (camera.set(self.kit.set()), &self.kit.scene);
+        let push = camera.push(scene, walks, [shown, end], sweeps > 0);
         let mut recorder = self.gpu.recorder("bidirectional splats")?;
         recorder.pass("light subpaths: to the camera", |p| {
             if shown == 0 && sweeps == 0 {
@@ -368,7 +360,7 @@ impl LightPaths {
     }
 
     fn sum(&self, camera: &Shown) -> Result<Timings> {
-        let set = camera.set(&self.kit);
+        let set = camera.set(self.kit.set());
         let mut recorder = self.gpu.recorder("bidirectional splats")?;
         recorder.pass("light subpaths: sum", |pass| {
             let push = bdpt_splat::Push { count: self.vertices };
@@ -394,7 +386,7 @@ impl LightPaths {
         let Some(camera) = &self.camera else {
             return Ok(());
         };
-        let set = camera.set(&self.kit);
+        let set = camera.set(self.kit.set());
         recorder.pass("light subpaths: add", |pass| {
             let push = bdpt_add::Push {
                 first_pixel: wave.first_pixel,
@@ -409,89 +401,6 @@ impl LightPaths {
             Ok(())
         })
     }
-}
-
-impl Shown {
-    fn new(
-        gpu: &Gpu,
-        scene: &GpuScene,
-        frame: &CameraFrame,
-        size: [u32; 2],
-        settings: &BidirectionalSettings,
-        capacity: u32,
-    ) -> Result<Self> {
-        let pixels = size[0] * size[1];
-        Ok(Self {
-            pipeline: camera_pipeline(gpu, scene, frame, settings)?,
-            splat: gpu.compute_pipeline(&Default::default())?,
-            add: gpu.compute_pipeline(&Default::default())?,
-            splats: splats(gpu, capacity)?,
-            sums: work(
-                gpu,
-                "splat sums",
-                size_of::<SplatSum>(),
-                pixels * settings.pass_of(pixels)[0],
-            )?,
-            frame: *frame,
-            size,
-            bounces: settings.bounces(),
-        })
-    }
-
-    fn set<'a>(&'a self, kit: &'a Kit) -> BidirectionalSet<'a> {
-        BidirectionalSet {
-            light_splats: self.splats.view(),
-            splat_sums: self.sums.view(),
-            ..kit.set()
-        }
-    }
-
-    fn push(&self, kit: &Kit, pass: u32, [first, end]: [u32; 2], goes_on: bool) -> bdpt_camera::Push {
-        let (v, [lower, upper]) = (&self.frame, kit.scene.bounds());
-        bdpt_camera::Push {
-            origin: v.origin,
-            half_width: v.half_width,
-            right: v.right,
-            half_height: v.half_height,
-            up: v.up,
-            lens_radius: v.lens_radius,
-            forward: v.forward,
-            focus_distance: v.focus_distance,
-            width: self.size[0],
-            height: self.size[1],
-            scene_lower: lower.to_array(),
-            least_bounces: self.bounces[0],
-            scene_upper: upper.to_array(),
-            most_bounces: self.bounces[1],
-            pass,
-            walks: kit.group,
-            seed: kit.seed,
-            first,
-            end,
-            goes_on: goes_on.into(),
-        }
-    }
-}
-
-fn camera_pipeline(
-    gpu: &Gpu,
-    scene: &GpuScene,
-    frame: &CameraFrame,
-    settings: &BidirectionalSettings,
-) -> Result<ComputePipeline<bdpt_camera::Kernel>> {
-    let traversal = scene.index_traversal();
-    let spec = surface_spec!(bdpt_camera, scene, {
-        has_multiple_scattering: scene.bsdf_features().multiple_scattering,
-        separable_masking: false,
-        has_alpha: scene.profile().has_alpha(),
-        has_lens: frame.lens_radius > 0.0 && !frame.orthographic,
-        parallel_camera: frame.orthographic,
-        strategy: settings.strategies.kind(),
-        index_quota: quota_of(gpu, scene, 1)?,
-        index_kind: traversal.kind(),
-        ..Default::default()
-    });
-    traversal.pipeline(gpu, &spec)
 }
 
 impl Kit {
@@ -566,15 +475,4 @@ fn vertices_of_device(gpu: &Gpu) -> u64 {
 fn vertex_texels(gpu: &Gpu, vertices: u32) -> Result<TexelView> {
     let texels = u64::from(vertices) * u64::from(LIGHT_VERTEX_QUARTERS);
     gpu.storage_texels("light vertices", Category::Work, vk::Format::R32G32B32A32_UINT, texels)
-}
-
-fn splats(gpu: &Gpu, vertices: u32) -> Result<Buffer> {
-    work(gpu, "light splats", size_of::<LightSplat>(), vertices)
-}
-
-/// Whether the sums of a picture, so many for each pixel, fit into one buffer.
-fn fits(gpu: &Gpu, [width, height]: [u32; 2], samples: u32) -> bool {
-    let sums = u64::from(width) * u64::from(height) * u64::from(samples);
-    let bytes = sums * size_of::<SplatSum>() as u64;
-    bytes <= gpu.caps().max_storage_buffer_range
 }

@@ -8,6 +8,7 @@ mod light_paths;
 pub mod mis;
 mod renderer;
 mod settings;
+mod splats;
 
 pub(super) use card::CARD;
 pub use renderer::{BidirectionalCounts, BidirectionalPaths};

@@ -21,6 +21,7 @@ use crate::gpu::{Buffer, Gpu, PipelineInfo, TexelView, Timings, wide_counter};
 use crate::scene::camera_frame::CameraFrame;
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
+use crate::techniques::path::SAMPLES_PER_WAVE;
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::{WalkOptions, Walked, Walker, WaveInFlight};
 use crate::{Error, Result};
@@ -67,7 +68,7 @@ pub struct BidirectionalPaths {
     /// None where no light subpath brings anything.
     lights: Option<LightPaths>,
     film: GpuFilm,
-    /// Samples of a pass.
+    /// Samples of a pass, or of a wave where there are no light subpaths.
     each: u32,
     cursor: Cursor,
     in_flight: Option<InFlight>,
@@ -108,10 +109,14 @@ impl BidirectionalPaths {
         let lights = has_light_paths.then(|| LightPaths::new(gpu, &scene, &frame, size, &settings));
         let lights = lights.transpose()?;
         let connects = lights.is_some() && settings.strategies.connects();
-        let [each, _] = settings.pass_of(size[0] * size[1]);
+        let pixels = size[0] * size[1];
+        let each = match lights {
+            Some(_) => settings.pass_of(pixels)[0],
+            None => SAMPLES_PER_WAVE,
+        };
         let kernels = EyeKernels::new(gpu, &scene, &frame, &settings, connects)?;
         // Takes as much memory as is left, if it must.
-        let (buffers, memory) = EyeMemory::within(gpu, &scene, size[0] * size[1], &settings)?;
+        let (buffers, memory) = EyeMemory::within(gpu, &scene, pixels.saturating_mul(each), &settings)?;
         let options = WalkOptions {
             name: "bidirectional",
             shadows: scene.has_lights(),

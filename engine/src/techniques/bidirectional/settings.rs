@@ -12,9 +12,9 @@ use crate::{Error, Result};
 /// Light subpaths of a pass, at most: their vertices then stay within the buffers of the baseline even where nothing absorbs.
 pub(super) const LIGHT_PATHS_MAX: u32 = 1 << 16;
 /// Samples of a pass, at most: a wave's least slots hold some pixels of so many.
-const SAMPLES_PER_PASS_MAX: u32 = 16;
+const SAMPLES_AT_ONCE_MAX: u32 = 16;
 /// And as many as are chosen: light subpaths of a pass are walked for all of its samples, whether or not a picture takes them.
-const SAMPLES_PER_PASS: u32 = 8;
+const SAMPLES_AT_ONCE: u32 = 8;
 /// Scatterings that are counted at most.
 const BOUNCES_MAX: u32 = 4000;
 /// Scatterings that light subpaths are followed through at most, so that none is followed for ever between lossless surfaces.
@@ -67,7 +67,7 @@ crate::settings! {
         pub light_paths: u32 = 0, in 0..=LIGHT_PATHS_MAX, unit "paths per sample";
         /// Samples of each pixel in a pass, whose eye paths are joined to the light subpaths of all of them: small pictures fill the device so. 0 for as many as make 65536
         /// paths, up to 8. Changes the noise only.
-        pub samples_per_pass: u32 = 0, in 0..=SAMPLES_PER_PASS_MAX, unit "samples";
+        pub samples_at_once: u32 = 0, in 0..=SAMPLES_AT_ONCE_MAX, unit "samples";
         /// Vertices of light subpaths that each vertex of an eye path is joined to, drawn evenly from all of the pass; changes the noise only.
         pub connections: u32 = 1, in 1..=16, unit "connections";
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
@@ -99,10 +99,10 @@ crate::settings! {
 
 impl BidirectionalSettings {
     fn fits_together(&self) -> Result<()> {
-        if self.light_paths.saturating_mul(self.samples_per_pass) > LIGHT_PATHS_MAX {
+        if self.light_paths.saturating_mul(self.samples_at_once) > LIGHT_PATHS_MAX {
             let cause = format!(
-                "for each of {} samples_per_pass are more than the {LIGHT_PATHS_MAX} light subpaths that a pass has room for",
-                self.samples_per_pass
+                "for each of {} samples_at_once are more than the {LIGHT_PATHS_MAX} light subpaths that a pass has room for",
+                self.samples_at_once
             );
             return Err(Error::setting("light_paths", self.light_paths, cause));
         }
@@ -128,8 +128,8 @@ impl BidirectionalSettings {
     /// Samples of a pass of a picture of so many pixels, and light subpaths for each of them.
     pub(super) fn pass_of(&self, pixels: u32) -> [u32; 2] {
         let pixels = pixels.clamp(1, LIGHT_PATHS_MAX);
-        let samples = match self.samples_per_pass {
-            0 => (LIGHT_PATHS_MAX / pixels.max(self.light_paths)).clamp(1, SAMPLES_PER_PASS),
+        let samples = match self.samples_at_once {
+            0 => (LIGHT_PATHS_MAX / pixels.max(self.light_paths)).clamp(1, SAMPLES_AT_ONCE),
             wanted => wanted,
         };
         let paths = match self.light_paths {
@@ -186,9 +186,9 @@ mod tests {
 
     #[test]
     fn a_pass_has_a_light_subpath_a_pixel_and_sample_up_to_what_buffers_hold() {
-        let of = |light_paths, samples_per_pass| BidirectionalSettings {
+        let of = |light_paths, samples_at_once| BidirectionalSettings {
             light_paths,
-            samples_per_pass,
+            samples_at_once,
             ..BidirectionalSettings::default()
         };
         for (settings, pixels, expected) in [
