@@ -26,7 +26,8 @@ pub(super) const CASE: HardCase = HardCase {
     documented_bias: Some(
         "Kernels of photons reach in their plane as far as they are wide, under a wall that stands on it too: what lies within a kernel's \
          radius of a lit surface of the same plane gets a share of its light. Kernels shrink from pass to pass; choose a smaller radius, or \
-         the final gather, which sees the map only from afar.",
+         the final gather, which sees the map only from afar. Rasterized pictures are off by parts of a pixel at silhouettes, so that a \
+         surface may be seen there where it lies inside of the box, and is lit.",
     ),
     documented_walks: Some(
         "Virtual lights within rounding of an edge, 10⁻⁷ of its coordinates, shine past the surface beside it: single pixels outside a closed body get \

@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{ManyLight, ManyLightSettings, Visibility};
-use crate::Result;
+use super::{Interleaving, ManyLight, ManyLightSettings, Visibility};
 use crate::catalogue::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
@@ -13,18 +12,22 @@ use crate::gpu::shaders::techniques::instant_radiosity::{
     deferred_direct, deferred_gather, deferred_merge, deferred_split, vpl_append,
 };
 use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
+use crate::gpu::shaders::types::GatherState;
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend};
-use crate::gpu::{Buffer, PipelineInfo};
+use crate::gpu::{Buffer, Caps, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::{Settings, SettingsDecl, TypedSettings};
+use crate::techniques::foresight::frame_fits;
 use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
 use crate::transport::{PathSet, SURFACE_FEATURES};
+use crate::{Error, Result};
 
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Biased(
     "what the bound of the geometry term leaves out is not compensated; the filter averages the light of neighbouring pixels on a surface; \
-     visibility by maps errs at borders of shadows by their texels, and without any light goes through everything",
+     visibility by maps errs at borders of shadows by their texels, and without any light goes through everything; \
+     silhouettes are the rasterizer's, off by parts of a pixel",
 );
 
 const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT"];
@@ -59,8 +62,9 @@ pub(in crate::techniques) const CARD: Card = Card {
     settings: SettingsDecl::of::<ManyLightSettings>(),
     variants: &[Variant::DEFAULTS],
     foresight: Foresight {
+        fits,
         law,
-        ..Foresight::FRAMES
+        ..Foresight::PLAIN
     },
     create: |gpu, scene, view, settings| {
         let mut settings: ManyLightSettings = settings.read()?;
@@ -69,6 +73,22 @@ pub(in crate::techniques) const CARD: Card = Card {
         Ok(Box::new(technique))
     },
 };
+
+/// Refuses pictures that are larger than a storage buffer, or whose split ones are.
+fn fits(caps: &Caps, size: [u32; 2]) -> Result<()> {
+    frame_fits(caps, size)?;
+    let places = Interleaving::new(size, ManyLightSettings::default().interleave).places();
+    let (value, limit) = (places * size_of::<GatherState>() as u64, caps.max_storage_buffer_range);
+    if value > limit {
+        return Err(Error::LimitExceeded {
+            name: "split states".into(),
+            value,
+            limit_name: "maxStorageBufferRange",
+            limit,
+        });
+    }
+    Ok(())
+}
 
 /// Frames are independent, and pixels of a tile have the lights of one.
 fn law(_: &Settings) -> Result<Law> {
@@ -208,7 +228,7 @@ const ROWS: &[Row] = &[
         needs: NEEDS,
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::frames_with_rays_are_the_path_tracers",
-            "tests/tests/instant_radiosity/many_light.rs::twice_the_lights_are_as_bright",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::twice_the_lights_are_as_bright",
             "tests/tests/instant_radiosity/many_light.rs::frames_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/instant_radiosity/many_light.rs::what_is_not_needed_is_not_recorded",
             "tests/tests/instant_radiosity/many_light.rs::scenes_without_lights_are_black_and_walks_that_leave_do_no_harm",
@@ -252,8 +272,8 @@ const ROWS: &[Row] = &[
             "engine/src/techniques/instant_radiosity/many_light/interleave.rs::windows_have_every_tile_once_and_workgroups_have_one_tile",
             "engine/src/techniques/instant_radiosity/many_light/interleave.rs::parts_have_every_light_once",
             "tests/tests/twins/interleave.rs::interleaved_pixels_agree_with_their_twins",
-            "tests/tests/instant_radiosity/many_light.rs::tiles_that_have_all_lights_give_the_same_bits",
-            "tests/tests/instant_radiosity/many_light.rs::parts_of_the_lights_bring_as_much_as_all",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::tiles_that_have_all_lights_give_the_same_bits",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::parts_of_the_lights_bring_as_much_as_all",
         ],
         settings: &["interleave"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/interleave.rs")
@@ -262,16 +282,16 @@ const ROWS: &[Row] = &[
         id: "SVO-P14",
         name: "filter of interleaved light over neighbours in the same plane with the same normal",
         role: Role::PartOf("SVO-P12"),
-        limits: "Blurs contact shadows, and highlights of glossy surfaces, by as many pixels as there are tiles along a side, and surfaces of one height that lie apart but are neighbours in the picture; single pixels without neighbours keep their pattern.",
+        limits: "Blurs contact shadows, and highlights of glossy surfaces, by half as many pixels as there are tiles along a side, and surfaces of one height that lie apart but are neighbours in the picture; single pixels without neighbours keep their pattern.",
         sources: &[sources::LAINE_2007.whole(), sources::SUN_2015.at("§4.12")],
         shaders: &["shaders/techniques/instant_radiosity/deferred_merge.comp"],
         bias: Some(Bias::Biased(
             "the light of neighbouring pixels on a surface is averaged",
         )),
         tests: &[
-            "tests/tests/instant_radiosity/many_light.rs::filters_average_what_lies_in_one_plane_alone",
-            "tests/tests/instant_radiosity/many_light.rs::filters_divide_by_all_that_a_surface_scatters",
-            "tests/tests/instant_radiosity/many_light.rs::filtered_tiles_are_nearly_what_all_lights_bring",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::filters_average_what_lies_in_one_plane_alone",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::filters_divide_by_all_that_a_surface_scatters",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::filtered_tiles_are_nearly_what_all_lights_bring",
         ],
         settings: &["filter", "filter_plane", "filter_normal"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/kernels.rs")

@@ -13,7 +13,7 @@ use crate::raster::View;
 use crate::scene::camera_frame::CameraFrame;
 use crate::techniques::instant_radiosity::gather::SWEEPS_A_LIGHT;
 use crate::techniques::photon_mapping::Tracing;
-use crate::transport::random::{Sampler, sample_2d};
+use crate::transport::random::{Sampler, SamplerKind, sample_2d};
 use crate::transport::warp::square_to_disk;
 use crate::{Error, Result};
 
@@ -58,24 +58,24 @@ impl Frame {
 }
 
 impl ManyLight {
-    /// One place of the pixels and of the lens a frame, the same for all of them.
+    /// One place of the pixels and of the lens a frame, the same for all of them, and so of a sequence that is even over frames, whatever the sampler.
     pub(super) fn begin_frame(&mut self) -> Result<Frame> {
-        let (size, kind) = (self.film.size(), self.settings.sampler);
+        let size = self.film.size();
         let mut numbers = Sampler {
             pixel: 0,
             sample_index: self.done,
             dimension: 0,
             seed: self.settings.seed,
         };
-        let mut numbers = || sample_2d(&mut numbers, kind);
+        let mut numbers = || sample_2d(&mut numbers, SamplerKind::Sobol);
         let (place, lens): (DVec2, DVec2) = (numbers(), square_to_disk(numbers()));
         let camera = CameraFrame::new(&self.camera, size)?.seen_through(size, place, lens);
         let surfaces = self.scene.surfaces();
         let view = View::of_frame(&camera, &surfaces, Area::whole(size))?;
-        if self.parts.is_none() {
+        if let (Some(seen), None) = (&self.seen, &self.parts) {
             // Neither the lens nor the place in a pixel changes how much is seen by much.
             let views = std::slice::from_ref(&view);
-            self.parts = Some(self.coverage.parts(&surfaces, views, size)?);
+            self.parts = Some(seen.coverage.parts(&surfaces, views, size)?);
         }
         let stage = match &self.indirect {
             Some(indirect) => Stage::Walks(Box::new(indirect.tracer.begin(self.done, None))),

@@ -19,7 +19,7 @@ use crate::gpu::{
     Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Image, Pass, PipelineInfo, SOFTWARE_LOOP_CAP, Sampler,
     SamplerDesc, TexelView, wide_counter,
 };
-use crate::raster::{GBuffer, GBufferDesc, Layering, OmniShadowMaps, Output, Surfaces};
+use crate::raster::{Coverage, GBuffer, GBufferDesc, Layering, OmniShadowMaps, Output, Surfaces};
 use crate::scene::camera_frame::CameraFrame;
 use crate::techniques::Part;
 use crate::techniques::instant_radiosity::gather::{connections_at_once, lights_at_once};
@@ -37,6 +37,7 @@ const FILTER_WORK: u64 = 8;
 /// What a frame sees.
 pub(super) struct Seen {
     pub gbuffer: GBuffer,
+    pub coverage: Coverage,
     sampler: Sampler,
 }
 
@@ -54,6 +55,7 @@ impl Seen {
         };
         Ok(Self {
             gbuffer: GBuffer::new(gpu, surfaces, &desc)?,
+            coverage: Coverage::new(gpu)?,
             sampler: gpu.sampler(&SamplerDesc {
                 name: "seen texels",
                 filter: vk::Filter::NEAREST,

@@ -13,9 +13,11 @@
 //! Against the same light paths, `bounces=0..2` by lobes other than mirrors:
 //!
 //! - *Bound.* Light over edges that are shorter than the bound of the geometry term allows is left out in part, and nothing compensates it.
-//! - *Filter.* The light of neighbours on the same surface is averaged, up to n pixels apart: contact shadows are as much softer, and of glossy surfaces so are highlights.
+//! - *Filter.* The light of neighbours on the same surface is averaged, up to n/2 pixels away: contact shadows are as much softer, and of glossy surfaces so are highlights.
 //! - *Visibility.* `none` lets light through everything. `maps` errs at borders of shadows by half a texel of what the virtual light sees, and as a whole about what is
 //!   smaller than texels; light that a virtual light transmits through its own surface is in the shadow of that. `rays` adds no error.
+//! - *Edges.* Rasterizers round corners to parts of a pixel (1/256 here): what is seen at a silhouette may be what lies behind, as far beside it, even where that is inside
+//!   of a closed body.
 //!
 //! Transparent surfaces are opaque to all three, to eye and light, which for these light paths is right; what is there in part is refused.
 //!

@@ -10,7 +10,7 @@ use super::settings::{ManyLightSettings, Visibility};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu, PipelineInfo};
-use crate::raster::{Coverage, DrawPart};
+use crate::raster::DrawPart;
 use crate::scene::camera_frame::CameraFrame;
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
@@ -54,7 +54,6 @@ pub struct ManyLight {
     pub(super) radiance: Buffer,
     /// None where nothing of surfaces is shown.
     pub(super) seen: Option<Seen>,
-    pub(super) coverage: Coverage,
     /// Parts that what the camera sees is drawn in, once they are known.
     pub(super) parts: Option<Vec<DrawPart>>,
     pub(super) direct: Option<Direct>,
@@ -113,7 +112,6 @@ impl ManyLight {
         Ok(Self {
             gpu: gpu.clone(),
             seen,
-            coverage: Coverage::new(gpu)?,
             parts: None,
             direct,
             indirect,
