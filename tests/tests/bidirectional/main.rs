@@ -7,7 +7,6 @@
 mod agreement;
 mod edge_cases;
 mod strategies;
-mod zz_long;
 
 use clerestory::film::z_test::{SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
