@@ -101,6 +101,7 @@ impl Shown {
     }
 }
 
+/// The kernel that shows vertices to a camera.
 pub(super) fn camera_pipeline(
     gpu: &Gpu,
     scene: &GpuScene,
@@ -122,6 +123,7 @@ pub(super) fn camera_pipeline(
     traversal.pipeline(gpu, &spec)
 }
 
+/// Room for what so many vertices show.
 pub(super) fn splats(gpu: &Gpu, vertices: u32) -> Result<Buffer> {
     work(gpu, "light splats", size_of::<LightSplat>(), vertices)
 }
