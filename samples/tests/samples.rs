@@ -322,11 +322,11 @@ fn the_viewer_goes_through_the_techniques() {
         drawn[1] > 10.0 && drawn[1] < path_traced[1],
         "{drawn:?} {path_traced:?}"
     );
-    // One beside the path tracer, photon mapping and virtual lights, and around.
-    let (_, text) = shown(&[lit, "--keys", "tttt"]);
+    // Around, from the last one.
+    let (_, text) = shown(&[lit, "--technique", "many-light", "--keys", "t"]);
     assert!(text.contains("path, "), "{text}");
-    // What cannot render the scene is left out.
-    let (_, text) = shown(&["builtin:cornell-box", "--keys", "ttt"]);
+    // What cannot render the scene is left out: of media, all but the path tracer.
+    let (_, text) = shown(&["builtin:fog-box", "--keys", "t"]);
     assert!(text.contains("path, "), "{text}");
 }
 

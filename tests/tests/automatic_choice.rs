@@ -527,11 +527,12 @@ fn the_path_tracer_does_not_win_by_what_it_misses() {
             plan(&renderer, &options, goal(0.2), &mut || goes_on).unwrap()
         };
         // All variants of the path tracer miss the same: one of them stands for all.
-        let free = of(
-            None,
-            serde_json::json!({ "sampler": "sobol", "roulette_start": 4 }),
-            true,
-        );
+        let cards = ["path", "photon"].map(|id| techniques::by_id(id).unwrap());
+        let one = RenderOptions {
+            settings: serde_json::json!({ "sampler": "sobol", "roulette_start": 4 }).into(),
+            ..options()
+        };
+        let free = plan_among(&renderer, &cards, &one, goal(0.2), &mut || true).unwrap();
         let choice = free.choice();
         assert_eq!((choice.technique, choice.reason.as_str()), ("photon", ""), "{free:?}");
         assert!(
