@@ -18,4 +18,5 @@ xvfb-run -a "$samples/viewer" 'builtin:cornell-box?sphere=gold' --size 180x180 -
 xvfb-run -a "$samples/photon_viewer" --size 240x180 --photons 131072 --spread 16 --exposure -1.5 --frames 12 --screenshot "$out/photon_viewer.png"
 "$samples/octahedron_lab" --output "$out/octahedron_lab.png" --size 1000x400 --channel distance --against cube
 "$samples/reflection_preview" --output "$out/reflection_preview.png" --size 240x180 --samples 4 --shadow 1024 --frames 5
+"$samples/mirror_room" "$out/mirror_room.png" --size 180x180 --spp 64
 ls -l "$out"

@@ -646,3 +646,27 @@ fn the_reflection_preview_refuses_what_it_cannot_show() {
         assert!(said(&output).contains(expected), "{}", said(&output));
     }
 }
+
+/// The numbers that the mirror room prints: by how much each picture differs from that by rays.
+#[test]
+fn the_mirror_room_comes_nearer_to_rays_with_distances() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mirror.png");
+    let small = ["--size", "32x32", "--spp", "16", "--map", "128"];
+    let scene = ["--scene", "builtin:cornell-box?source=point&sphere=mirror"];
+    let arguments = [&[path.to_str().unwrap()][..], &small, &scene].concat();
+    let output = run(env!("CARGO_BIN_EXE_mirror_room"), &arguments);
+    let text = said(&output);
+    let percent = |name: &str| -> f32 {
+        let line = text.lines().find(|line| line.starts_with(name));
+        let line = line.unwrap_or_else(|| panic!("no line of {name:?}: {text}"));
+        let number = line.split(" by ").nth(1).and_then(|rest| rest.split(' ').next());
+        number
+            .and_then(|number| number.parse().ok())
+            .unwrap_or_else(|| panic!("no number: {line}"))
+    };
+    let [alone, step, search] = ["the map alone", "one step", "the search"].map(percent);
+    assert!(step < 0.7 * alone && search < 0.7 * alone, "{text}");
+    let picture = open(&path);
+    assert_eq!(picture.dimensions(), (128, 32));
+}
