@@ -52,7 +52,7 @@ fn check_some(kind: impl Fn(&Subject) -> bool, some: impl Fn(&HardCase) -> bool)
 }
 
 /// Subjects that have a test each; all other techniques share one.
-const ALONE: [&str; 4] = ["path (sobol)", "path (pcg)", "photon", "vpl"];
+const ALONE: [&str; 5] = ["path (sobol)", "path (pcg)", "photon", "vpl", "bdpt"];
 
 fn check_alone(name: &str) {
     check_some_alone(name, |_| true);
@@ -95,6 +95,16 @@ fn virtual_lights_take_the_cases_of_materials_as_documented() {
 #[test]
 fn virtual_lights_take_the_other_cases_as_documented() {
     check_some_alone("vpl", |case| !OF_MATERIALS.contains(&case.name));
+}
+
+#[test]
+fn bidirectional_paths_take_the_cases_of_materials_as_documented() {
+    check_some_alone("bdpt", |case| OF_MATERIALS.contains(&case.name));
+}
+
+#[test]
+fn bidirectional_paths_take_the_other_cases_as_documented() {
+    check_some_alone("bdpt", |case| !OF_MATERIALS.contains(&case.name));
 }
 
 #[test]

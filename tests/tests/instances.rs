@@ -163,6 +163,9 @@ fn by_technique(gpu: &Gpu, scene: &Scene, technique: &str, index: &str) -> Resul
     })
 }
 
+/// Techniques that draw triangle by triangle, and refuse scenes that keep their instances.
+const DRAWN: [&str; 4] = ["preview", "many-light", "impostor", "localized-gather"];
+
 #[test]
 fn other_techniques_render_kept_instances_or_refuse_them() {
     with_gpu(|gpu| {
@@ -174,7 +177,7 @@ fn other_techniques_render_kept_instances_or_refuse_them() {
         let values = |report: &Report| report.picture.layer("radiance").unwrap().values().to_vec();
         let lamps = prisms();
         let all = techniques::all().iter().map(|card| card.id);
-        let kept = all.filter(|technique| !["preview", "many-light"].contains(technique));
+        let kept = all.filter(|technique| !DRAWN.contains(technique));
         for (technique, scene) in kept.flat_map(|technique| [(technique, &lamps), (technique, &sky)]) {
             let [truth, found] = ["wide", "two-level"].map(|index| by_technique(gpu, scene, technique, index));
             match (truth, found) {
@@ -197,7 +200,7 @@ fn other_techniques_render_kept_instances_or_refuse_them() {
                 intensity: Vec3::ONE,
             },
         );
-        for technique in ["preview", "many-light"] {
+        for technique in DRAWN {
             let refused = by_technique(gpu, &lit, technique, "two-level").unwrap_err();
             let Error::Unsupported { reasons, .. } = &refused else {
                 panic!("{refused}");

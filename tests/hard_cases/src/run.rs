@@ -64,11 +64,12 @@ impl Subject {
     }
 
     /// A technique's subjects: one for each sampler that its setting `sampler` offers; those with a bias, which are not judged by their noise, and those
-    /// whose pictures hold a part of the light alone, have their default sampler alone. Cards of a host's own are as good as the engine's.
+    /// whose pixels share the noise of a pass, have their default sampler alone. Cards of a host's own are as good as the engine's.
     pub fn of(info: &'static Card) -> Vec<Self> {
         let infos = info.settings.infos();
+        let shares_noise = shares_noise(info, &Settings::default()).unwrap_or(false);
         match infos.iter().find(|setting| setting.name == "sampler") {
-            Some(setting) if matches!(info.bias, Bias::Unbiased) && info.path_set == PathSet::ALL => {
+            Some(setting) if matches!(info.bias, Bias::Unbiased) && !shares_noise => {
                 let subject = |sampler: &&'static str| Self::Technique {
                     info,
                     sampler: Some(*sampler),

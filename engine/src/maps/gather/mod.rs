@@ -25,8 +25,8 @@ mod reflectivity;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use device::device_lights;
 pub use device::Gather;
+pub(crate) use device::device_lights;
 pub use lights::{
     GatherLight, GatherLights, GatherPoint, GatherSettings, Lobe, SolidAngleForm, Terms, gather_solid_angle,
 };

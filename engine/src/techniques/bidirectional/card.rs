@@ -37,8 +37,10 @@ pub(in crate::techniques) const CARD: Card = Card {
     variants: &[Variant::DEFAULTS],
     foresight: Foresight {
         misses: |profile, lights, wanted| unseen_of_lights(profile, lights, wanted, BETWEEN_MIRRORS, BY_NO_JOINT),
-        law: |_| {
+        law: |settings| {
+            let settings: BidirectionalSettings = settings.read()?;
             Ok(Law {
+                samples_a_pass: settings.samples_of_pass(),
                 // All pixels have the light subpaths of a pass.
                 shares_noise: true,
                 ..Law::INDEPENDENT

@@ -125,6 +125,14 @@ impl BidirectionalSettings {
         self.most_bounces != Some(0) && (self.strategies.connects() || self.strategies.splats())
     }
 
+    /// Samples of a pass, at most: of small pictures all of them.
+    pub(super) fn samples_of_pass(&self) -> u32 {
+        match self.samples_per_pass {
+            0 => SAMPLES_AT_ONCE,
+            wanted => wanted,
+        }
+    }
+
     /// Samples of a pass of a picture of so many pixels, and light subpaths for each of them.
     pub(super) fn pass_of(&self, pixels: u32) -> [u32; 2] {
         let pixels = pixels.clamp(1, LIGHT_PATHS_MAX);
