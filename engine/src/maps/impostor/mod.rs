@@ -226,7 +226,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-D9",
         name: "distances in a buffer of their own, beside radiance and normals",
         role: Role::PartOf("MET-D1"),
-        limits: "What it is measured against, four numbers a texel with the distance as the fourth, is there for cubes of one layer without normals alone.",
+        limits: "What it is measured against, four numbers a texel with the distance as the fourth, is there for one layer without normals alone.",
         sources: &[sources::SZIRMAY_KALOS_2005.whole()],
         shaders: &["shaders/maps/impostor_set.glsl", "shaders/maps/impostor_layouts.comp"],
         bias: None,
