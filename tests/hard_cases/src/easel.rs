@@ -114,13 +114,14 @@ impl<'a> Easel<'a> {
         self.with("samples_per_pass", self.samples_of_pass(samples))
     }
 
-    /// As many samples a pass as are wanted, or as the technique's setting allows; all that are wanted where there is none.
+    /// As many samples a pass as are wanted, or as the technique's setting allows; where there is none, as pixels share the noise of.
     pub fn samples_of_pass(&self, wanted: u32) -> u32 {
         let infos = self.info.settings.infos();
         let setting = infos.iter().find(|setting| setting.name == "samples_per_pass");
         // The range is in words: its end is the last of them.
         let most = setting.and_then(|setting| setting.range.split_whitespace().last()?.parse().ok());
-        wanted.min(most.unwrap_or(u32::MAX))
+        let shared = self.pass_samples().ok().flatten();
+        wanted.min(most.or(shared).unwrap_or(u32::MAX))
     }
 
     /// For scenes whose paths lose half of their light at each bounce: without the rare bright samples of early Russian roulette the

@@ -127,7 +127,7 @@ impl BidirectionalSettings {
 
     /// Samples of a pass, at most: of small pictures all of them.
     pub(super) fn samples_of_pass(&self) -> u32 {
-        match self.samples_per_pass {
+        match self.samples_at_once {
             0 => SAMPLES_AT_ONCE,
             wanted => wanted,
         }
