@@ -145,7 +145,6 @@ impl ImpostorReflections {
             shadow_side: settings.shadow_side,
             samples: settings.capture_samples,
             sampler: settings.sampler,
-            seed: settings.seed,
         };
         let has_reflector = !plan.left_out.is_empty();
         let capture = has_reflector.then(|| Capture::new(gpu, &scene, plan)).transpose()?;

@@ -15,7 +15,9 @@
 //! - What the map's place does not see lights nothing, and radiance is that towards the map's place.
 //! - Each texel is one disc of even radiance: with normals the error falls with more of them, without it stays.
 //! - Microfacets reflect by a power of the cosine about the mirrored direction, of an exponent of 64 at most; their albedo is that of even surroundings.
-//! - The map is the capture's, with its shadows and its noise.
+//! - At grazing views a half of the lobe about the mirrored direction is below the surface, where lights count that the surface does not see.
+//! - Rough conductors reflect by Schlick's factor.
+//! - The map is the capture's, with its shadows and its noise, which is the same for all seeds.
 //!
 //! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit, modified Phong and classical microfacets, and scenes that keep their instances.
 

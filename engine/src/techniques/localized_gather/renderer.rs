@@ -134,7 +134,6 @@ impl LocalizedGather {
             shadow_side: settings.shadow_side,
             samples: settings.capture_samples,
             sampler: settings.sampler,
-            seed: settings.seed,
         };
         let has_light = surfaces.triangles > 0 && scene.has_lights();
         let capture = has_light.then(|| Capture::new(gpu, &scene, plan)).transpose()?;
