@@ -23,6 +23,27 @@ fn lit_room() -> Scene {
 }
 
 #[test]
+fn passes_have_as_many_samples_as_there_are_sums_for() {
+    with_gpu(|gpu| {
+        let (scene, range) = (lit_room(), gpu.caps().max_storage_buffer_range);
+        let settings = BidirectionalSettings {
+            samples_at_once: 16,
+            ..BidirectionalSettings::default()
+        };
+        // 24 bytes for each pixel and sample: four samples of every pixel, and half a sample.
+        let side = |samples: f64| (range as f64 / 24.0 / samples).sqrt() as u32;
+        if range > 1 << 30 {
+            return;
+        }
+        let some = renderer(gpu, &scene, [side(4.5); 2], &settings);
+        assert_eq!(some.settings().samples_at_once, 4);
+        let none = BidirectionalPaths::new(gpu, upload(gpu, &scene), &scene.cameras[0], [side(0.5); 2], settings);
+        let error = none.err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("maxStorageBufferRange"), "{error}");
+    });
+}
+
+#[test]
 fn pictures_do_not_depend_on_how_the_work_is_cut_up() {
     with_gpu(|gpu| {
         let scene = lit_room();

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::mis;
 use super::renderer::BidirectionalPaths;
 use super::settings::BidirectionalSettings;
+use super::splats::sums_within;
 use crate::Result;
 use crate::catalogue::{Role, Row, sources};
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -46,7 +47,7 @@ pub(in crate::techniques) const CARD: Card = Card {
                 ..Law::INDEPENDENT
             })
         },
-        ..Foresight::PLAIN
+        fits: |caps, size| sums_within(caps, size).map(|_| ()),
     },
     create: |gpu, scene, view, settings| {
         let mut settings: BidirectionalSettings = settings.read()?;
@@ -148,11 +149,6 @@ impl Technique for BidirectionalPaths {
                 what: "light subpaths",
                 why: "no light can be chosen, or the picture has nothing of theirs",
             });
-        } else if !self.meets_the_camera() {
-            skipped.push(Skipped {
-                what: "light subpaths that meet the camera",
-                why: "the picture's sums are larger than a buffer of the device",
-            });
         }
         skipped
     }
@@ -201,7 +197,7 @@ const ROWS: &[Row] = &[
         id: "CL-LIGHT-SPLATS",
         name: "light subpaths that meet the camera, summed by integers: the same bits in whatever order",
         role: Role::PartOf("CL-BDPT"),
-        limits: "Steps are 2⁻⁴⁰ of the greatest contribution of a pass; not for pictures whose sums, 24 bytes a pixel, pass a buffer of the device.",
+        limits: "Steps are 2⁻⁴⁰ of the greatest contribution of a pass; pictures whose sums, 24 bytes a pixel, pass a buffer of the device are refused.",
         sources: &[sources::VEACH_1997.at("10.3.2")],
         shaders: &[
             "shaders/techniques/bidirectional/bdpt_camera.comp",
@@ -211,6 +207,7 @@ const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/bidirectional/strategies.rs::light_subpaths_meet_cameras_of_all_kinds",
             "tests/tests/bidirectional/edge_cases.rs::threads_of_the_driver_never_show",
+            "tests/tests/bidirectional/edge_cases.rs::passes_have_as_many_samples_as_there_are_sums_for",
         ],
         ..Row::of("engine/src/techniques/bidirectional/splats.rs")
     },

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::eye::EyeWave;
 use super::kernels::{Counters, Counts, check_sweeps, rays_of_submission, set_of, work};
 use super::settings::BidirectionalSettings;
-use super::splats::{Shown, ShownWalks, camera_pipeline, fits, splats};
+use super::splats::{Shown, ShownWalks, camera_pipeline, splats};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{LIGHT_VERTEX_QUARTERS, WALK_GROUP};
@@ -170,7 +170,7 @@ impl LightPaths {
             rays_at_once: rays_of_submission(gpu),
             counts: LightCounts::default(),
         };
-        if settings.strategies.splats() && fits(gpu, size, samples) {
+        if settings.strategies.splats() {
             paths.camera = Some(Shown::new(gpu, scene, frame, size, settings, capacity)?);
         }
         Ok(paths)
@@ -287,11 +287,12 @@ impl LightPaths {
         if needed > u64::from(self.kit.capacity) {
             // The pass is walked again, with room for all.
             let capacity = (needed + needed / 4).min(most) as u32;
-            self.kit.vertices = vertex_texels(&self.gpu, capacity)?;
-            self.kit.capacity = capacity;
+            // First what can fail: vertices and what is shown of them have the same room.
+            let vertices = vertex_texels(&self.gpu, capacity)?;
             if let Some(camera) = &mut self.camera {
                 camera.splats = splats(&self.gpu, capacity)?;
             }
+            (self.kit.vertices, self.kit.capacity) = (vertices, capacity);
             return Ok(timings);
         }
         self.vertices = needed as u32;

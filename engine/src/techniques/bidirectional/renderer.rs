@@ -96,6 +96,7 @@ impl BidirectionalPaths {
         settings: BidirectionalSettings,
     ) -> Result<Self> {
         settings.check()?;
+        let settings = settings.within(gpu.caps(), size)?;
         let reasons = refusals(scene.profile());
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
@@ -161,7 +162,7 @@ impl BidirectionalPaths {
         self.lights.is_some()
     }
 
-    /// Whether light subpaths meet the camera: not where the picture's sums pass the device's largest buffer.
+    /// Whether light subpaths meet the camera.
     pub fn meets_the_camera(&self) -> bool {
         self.lights.as_ref().is_some_and(LightPaths::meet_the_camera)
     }

@@ -3,6 +3,8 @@
 use crate::gpu::shaders::constants::{
     STRATEGY_COMBINED, STRATEGY_CONNECTIONS, STRATEGY_EMISSION, STRATEGY_LIGHT_SAMPLES, STRATEGY_SPLATS,
 };
+use super::splats::sums_within;
+use crate::gpu::Caps;
 use crate::settings::AboveTo;
 use crate::transport::PathSet;
 use crate::transport::path_set::PATH_SET_LOBES;
@@ -131,6 +133,22 @@ impl BidirectionalSettings {
             0 => SAMPLES_AT_ONCE,
             wanted => wanted,
         }
+    }
+
+    /// With no more samples at once than a device has room for the sums of, where light subpaths meet the camera.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] where those of one sample are too many.
+    pub(super) fn within(self, caps: &Caps, size: [u32; 2]) -> Result<Self> {
+        if !self.strategies.splats() {
+            return Ok(self);
+        }
+        let most = sums_within(caps, size)?;
+        let [samples, _] = self.pass_of(size[0].saturating_mul(size[1]));
+        Ok(Self {
+            samples_at_once: if samples > most { most } else { self.samples_at_once },
+            ..self
+        })
     }
 
     /// Samples of a pass of a picture of so many pixels, and light subpaths for each of them.

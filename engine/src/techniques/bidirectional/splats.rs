@@ -2,13 +2,13 @@
 
 use super::kernels::{quota_of, work};
 use super::settings::BidirectionalSettings;
-use crate::Result;
 use crate::gpu::shaders::sets::BidirectionalSet;
 use crate::gpu::shaders::techniques::bidirectional::{bdpt_add, bdpt_camera, bdpt_splat};
 use crate::gpu::shaders::types::{LightSplat, SplatSum};
-use crate::gpu::{Buffer, ComputePipeline, Gpu};
+use crate::gpu::{Buffer, Caps, ComputePipeline, Gpu};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::{GpuScene, surface_spec};
+use crate::{Error, Result};
 
 /// Whose vertices are shown.
 #[derive(Debug, Clone, Copy)]
@@ -128,9 +128,22 @@ pub(super) fn splats(gpu: &Gpu, vertices: u32) -> Result<Buffer> {
     work(gpu, "light splats", size_of::<LightSplat>(), vertices)
 }
 
-/// Whether the sums of a picture, so many for each pixel, fit into one buffer.
-pub(super) fn fits(gpu: &Gpu, [width, height]: [u32; 2], samples: u32) -> bool {
-    let sums = u64::from(width) * u64::from(height) * u64::from(samples);
-    let bytes = sums * size_of::<SplatSum>() as u64;
-    bytes <= gpu.caps().max_storage_buffer_range
+/// Sums of every pixel that a buffer of the device holds.
+///
+/// # Errors
+/// [`Error::LimitExceeded`] where it holds less than one.
+pub(super) fn sums_within(caps: &Caps, [width, height]: [u32; 2]) -> Result<u32> {
+    let (value, limit) = (
+        u64::from(width) * u64::from(height) * size_of::<SplatSum>() as u64,
+        caps.max_storage_buffer_range,
+    );
+    match limit / value.max(1) {
+        0 => Err(Error::LimitExceeded {
+            name: "sums of light subpaths by pixel".into(),
+            value,
+            limit_name: "maxStorageBufferRange",
+            limit,
+        }),
+        most => Ok(most.min(u32::MAX.into()) as u32),
+    }
 }
