@@ -100,7 +100,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     point_triangle(&mut lit, emitter, Vec3::Y);
     let painted = easel.paint(&lit, SMALL, 16)?;
     judgement.sound("beside a light", &painted);
-    if easel.info.settings.has("place") || easel.info.settings.has("light_paths") {
+    if easel.has("place") || easel.has("light_paths") {
         let differ = painted.bits().iter().zip(&alone.bits()).filter(|(a, b)| a != b).count();
         judgement.at_most_documented("beside a light: values that differ", differ as f64, 0.0, f64::INFINITY);
     } else {
