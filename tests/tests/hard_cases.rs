@@ -52,7 +52,16 @@ fn check_some(kind: impl Fn(&Subject) -> bool, some: impl Fn(&HardCase) -> bool)
 }
 
 /// Subjects that have a test each; all other techniques share one.
-const ALONE: [&str; 5] = ["path (sobol)", "path (pcg)", "photon", "vpl", "bdpt"];
+const ALONE: [&str; 8] = [
+    "path (sobol)",
+    "path (pcg)",
+    "photon",
+    "vpl",
+    "bdpt",
+    "many-light",
+    "impostor",
+    "localized-gather",
+];
 
 fn check_alone(name: &str) {
     check_some_alone(name, |_| true);
@@ -105,6 +114,21 @@ fn bidirectional_paths_take_the_cases_of_materials_as_documented() {
 #[test]
 fn bidirectional_paths_take_the_other_cases_as_documented() {
     check_some_alone("bdpt", |case| !OF_MATERIALS.contains(&case.name));
+}
+
+#[test]
+fn frames_of_many_lights_take_the_cases_as_documented() {
+    check_alone("many-light");
+}
+
+#[test]
+fn impostors_take_the_cases_as_documented() {
+    check_alone("impostor");
+}
+
+#[test]
+fn localized_gathers_take_the_cases_as_documented() {
+    check_alone("localized-gather");
 }
 
 #[test]

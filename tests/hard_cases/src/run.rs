@@ -20,6 +20,8 @@ const WALKS: u32 = 32;
 /// details.
 const PROBE_SIDE: u32 = 64;
 const PROBE_FINEST: u32 = 32;
+/// And of maps that are captured for a scene.
+const MAP_SIDE: u32 = 64;
 
 /// What helps where a technique refuses a case.
 pub(crate) const WAY_ROUND: &str = "; choose another technique or change the scene";
@@ -194,7 +196,8 @@ fn easel_of<'a>(gpu: &'a Gpu, info: &'static Card) -> Easel<'a> {
         .with("photons", PHOTONS)
         .with("walks", WALKS)
         .with("probe_side", PROBE_SIDE)
-        .with("probe_finest", PROBE_FINEST);
+        .with("probe_finest", PROBE_FINEST)
+        .with("side", MAP_SIDE);
     if easel.has("photons") {
         easel.with("samples_per_pass", SAMPLES_PER_PASS)
     } else {

@@ -96,7 +96,6 @@ impl BidirectionalPaths {
         settings: BidirectionalSettings,
     ) -> Result<Self> {
         settings.check()?;
-        let settings = settings.within(gpu.caps(), size)?;
         let reasons = refusals(scene.profile());
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
@@ -105,6 +104,7 @@ impl BidirectionalPaths {
             });
         }
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
+        let settings = settings.within(gpu.caps(), size)?;
         let frame = CameraFrame::new(camera, size)?;
         let has_light_paths = scene.has_lights() && scene.light_power() > 0.0 && settings.has_light_paths();
         let lights = has_light_paths.then(|| LightPaths::new(gpu, &scene, &frame, size, &settings));
