@@ -414,8 +414,6 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/plan/noise.rs::pairs_of_one_view_keep_the_ratio_of_their_errors",
         "engine/src/plan/model.rs::models_return_what_they_were_fitted_to",
         "engine/src/plan/model.rs::pairs_fit_the_time_that_they_take",
-        "engine/src/plan/model.rs::first_samples_tell_of_pictures_of_fewer_samples_alone",
-        "engine/src/plan/model.rs::first_samples_tell_of_pictures_of_fewer_samples_alone",
         "engine/src/plan/model.rs::slopes_are_believed_alike_to_either_side_of_the_law",
         "engine/src/plan/model.rs::the_last_pair_alone_says_how_large_the_error_is",
         "engine/src/plan/model.rs::neither_stopping_nor_choosing_makes_predictions_optimistic",

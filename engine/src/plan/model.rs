@@ -39,8 +39,6 @@ pub struct ErrorModel {
     points: Vec<Point>,
     /// The measurement that nothing was decided by: it alone says how large the error is.
     last_pair: Option<Point>,
-    /// Of first samples: it tells of pictures of fewer samples than the others have, and of nothing else.
-    first: Option<Point>,
     /// What the measurement with so many samples has not seen, for all that is known.
     unseen: f64,
     unseen_at: f64,
@@ -60,7 +58,6 @@ impl ErrorModel {
             law,
             points: Vec::new(),
             last_pair: None,
-            first: None,
             unseen: 0.0,
             unseen_at: 0.0,
         }
@@ -76,12 +73,6 @@ impl ErrorModel {
     pub(super) fn clear(&mut self) {
         self.points.clear();
         self.last_pair = None;
-        self.first = None;
-    }
-
-    /// Takes a measurement of first samples, whose error falls otherwise than that of those that follow: where kernels shrink, eyes have one place in each pixel.
-    pub fn set_first(&mut self, samples: u32, relative_mse: f64, deviation: f64) {
-        self.first = Some(Self::point(samples, relative_mse, deviation));
     }
 
     /// Adds a measurement with more samples than those before, and its standard error.
@@ -111,13 +102,6 @@ impl ErrorModel {
     /// Where predictions begin.
     fn anchor(&self) -> Option<&Point> {
         self.last_pair.as_ref().or(self.points.last())
-    }
-
-    /// First samples and those after them that say how large the error is, where both have one.
-    fn from_first(&self) -> Option<[&Point; 2]> {
-        let next = self.last_pair.as_ref().or(self.points.first())?;
-        let first = self.first.as_ref().filter(|first| first.samples < next.samples)?;
-        (first.relative_mse > next.relative_mse && next.relative_mse > 0.0).then_some([first, next])
     }
 
     /// The error falls as samples^(−slope): between what was measured and the law, as far as each is known.
@@ -154,21 +138,18 @@ impl ErrorModel {
     }
 
     /// Relative MSE expected of `samples` samples per pixel: by the slope from the measurement that nothing was decided by, and without one between
-    /// measurements by the power law through both, beyond the last by the slope; of fewer samples by the power law from first samples on, where these were
-    /// measured; 0 without a measurement.
+    /// measurements by the power law through both, beyond the last by the slope; 0 without a measurement.
     pub fn relative_mse(&self, samples: f64) -> f64 {
         self.seen(samples) + self.unseen * self.unseen_at / samples
     }
 
     fn seen(&self, samples: f64) -> f64 {
-        if let Some([first, next]) = self.from_first().filter(|[_, next]| samples < next.samples) {
-            return through(first, next, samples);
-        }
         let between = self.points.windows(2).filter(|_| self.last_pair.is_none());
         for pair in between {
             let [a, b] = [pair[0], pair[1]];
             if samples < b.samples && a.relative_mse > 0.0 && b.relative_mse > 0.0 {
-                return through(&a, &b, samples);
+                let way = (samples / a.samples).ln() / (b.samples / a.samples).ln();
+                return a.relative_mse * (b.relative_mse / a.relative_mse).powf(way);
             }
         }
         let Some(anchor) = self.anchor() else { return 0.0 };
@@ -206,32 +187,19 @@ impl ErrorModel {
             return 1;
         }
         // Between measurements: where the power law through two of them meets it.
-        if let Some([first, next]) = self.from_first().filter(|[_, next]| relative_mse >= next.relative_mse) {
-            return (samples_between(first, next, relative_mse) - HAIR).ceil().max(1.0) as u32;
-        }
         let between = self.points.windows(2).filter(|_| self.last_pair.is_none());
         for pair in between {
             let [a, b] = [pair[0], pair[1]];
             if relative_mse >= b.relative_mse && a.relative_mse > b.relative_mse && b.relative_mse > 0.0 {
-                return (samples_between(&a, &b, relative_mse) - HAIR).ceil().max(1.0) as u32;
+                let way = (a.relative_mse / relative_mse).ln() / (a.relative_mse / b.relative_mse).ln();
+                let samples = a.samples * (b.samples / a.samples).powf(way);
+                return (samples - HAIR).ceil().max(1.0) as u32;
             }
         }
         let samples =
             anchor.samples * (anchor.relative_mse / relative_mse.max(f64::MIN_POSITIVE)).powf(1.0 / self.slope());
         (samples - HAIR).ceil().clamp(1.0, f64::from(u32::MAX)) as u32
     }
-}
-
-/// Relative MSE of so many samples by the power law through two measurements, both above 0.
-fn through(a: &Point, b: &Point, samples: f64) -> f64 {
-    let way = (samples / a.samples).ln() / (b.samples / a.samples).ln();
-    a.relative_mse * (b.relative_mse / a.relative_mse).powf(way)
-}
-
-/// Samples of that relative MSE by the power law through two measurements, the second one the lower.
-fn samples_between(a: &Point, b: &Point, relative_mse: f64) -> f64 {
-    let way = (a.relative_mse / relative_mse).ln() / (a.relative_mse / b.relative_mse).ln();
-    a.samples * (b.samples / a.samples).powf(way)
 }
 
 /// Exponents that a squared bias can be measured to fall with. That of a kernel's blur falls as its area squared, that of its edges as its radius: with
@@ -523,29 +491,6 @@ mod tests {
             sample: 0.25,
         };
         assert_eq!((cost.seconds(4.0), cost.samples(1.6), cost.samples(0.1)), (1.5, 4, 0));
-    }
-
-    #[test]
-    fn first_samples_tell_of_pictures_of_fewer_samples_alone() {
-        // Twice as steep as the law from the first sample on, which says nothing of what follows.
-        let mut model = ErrorModel::falling(2.0 / 3.0);
-        model.add(4, 0.01, 1e-4);
-        model.add(16, 0.01 * 4f64.powf(-2.0 / 3.0), 1e-4);
-        let without = model.clone();
-        model.set_first(1, 0.08, 1e-3);
-        assert_eq!(model.relative_mse(64.0), without.relative_mse(64.0));
-        assert_eq!(model.samples(0.001), without.samples(0.001));
-        assert!((model.relative_mse(1.0) / 0.08 - 1.0).abs() < 1e-12);
-        assert!((model.relative_mse(2.0) / (0.08f64 * 0.01).sqrt() - 1.0).abs() < 1e-12);
-        // By the law the first sample would do for 0.03.
-        assert_eq!(
-            [without.samples(0.03), model.samples(0.03), model.samples(0.1)],
-            [1, 2, 1]
-        );
-        // The pair that nothing was decided by says how large the error is of those that follow.
-        model.conclude(4, 0.02, 1e-4);
-        assert!((model.relative_mse(2.0) / (0.08f64 * 0.02).sqrt() - 1.0).abs() < 1e-12);
-        assert_eq!(model.samples(0.05), 2);
     }
 
     #[test]

@@ -344,7 +344,7 @@ impl<'a> Trial<'a> {
         } else {
             Truth::Neighbourhood
         };
-        // First samples are there for the bias, and for pictures of few samples. What is known to fall otherwise tells the error only where nothing else does.
+        // First samples are there for the bias alone. What is known to fall otherwise tells the error only where nothing else does.
         let telling = |stage: &&Stage| stage.spp >= self.law.samples_least;
         let least = match self.stages.iter().chain(last).any(|stage| telling(&stage)) {
             true => self.law.samples_least.max(2),
@@ -361,14 +361,6 @@ impl<'a> Trial<'a> {
             .collect();
         let found = noise_of_pairs(&pairs, RELATIVE_MSE_OFFSET, kind)?;
         self.error.clear();
-        // The others know nothing of first samples, which are noisier than their truths.
-        if let Some(first) = self.stages.first().filter(|stage| stage.spp < least) {
-            let [a, b] = &first.pictures;
-            let pairs: Vec<Pair<'_>> = std::iter::once((first.spp, [a, b])).chain(pairs).collect();
-            if let Some(found) = noise_of_pairs(&pairs, RELATIVE_MSE_OFFSET, kind)?.first() {
-                self.error.set_first(first.spp, found.relative_mse, found.deviation);
-            }
-        }
         for (index, (stage, found)) in stages.iter().zip(&found).enumerate() {
             if last.is_some() && index + 1 == stages.len() {
                 self.error.conclude(stage.spp, found.relative_mse, found.deviation);

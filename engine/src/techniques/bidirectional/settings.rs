@@ -1,10 +1,10 @@
 //! Settings of bidirectional path tracing.
 
+use super::splats::sums_within;
+use crate::gpu::Caps;
 use crate::gpu::shaders::constants::{
     STRATEGY_COMBINED, STRATEGY_CONNECTIONS, STRATEGY_EMISSION, STRATEGY_LIGHT_SAMPLES, STRATEGY_SPLATS,
 };
-use super::splats::sums_within;
-use crate::gpu::Caps;
 use crate::settings::AboveTo;
 use crate::transport::PathSet;
 use crate::transport::path_set::PATH_SET_LOBES;
