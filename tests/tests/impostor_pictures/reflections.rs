@@ -193,7 +193,8 @@ fn area_lights_and_skies_are_mirrored_by_rays() {
             settings: json!({"capture": "raster"}).into(),
             ..RenderOptions::default()
         });
-        let error = refused.err().expect("refused").to_string();
+        let Err(error) = refused else { panic!("was not refused") };
+        let error = error.to_string();
         assert!(
             error.contains("surfaces emit light") && error.contains("environment"),
             "{error}"

@@ -198,7 +198,6 @@ impl EyeKernels {
             write_aovs: settings.aovs,
             strategy: settings.strategies.kind(),
             parallel_camera: frame.orthographic,
-            ..Default::default()
         });
         let connect = connects.then(|| Connect::new(gpu, scene, frame.orthographic, settings));
         Ok(Self {

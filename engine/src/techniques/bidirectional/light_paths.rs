@@ -36,6 +36,7 @@ const LIGHT_SEED: u32 = 0x6c69_6768;
 const SPLATS_MAX: u64 = 1 << 22;
 
 /// Light subpaths of a pass, as far as they are.
+#[expect(clippy::large_enum_variant, reason = "there is one for each renderer")]
 enum Phase {
     /// Before the first submission.
     Before,

@@ -199,7 +199,7 @@ mod tests {
         }
 
         /// Partial weights of eye subpaths where they arrive, by vertex from the first behind the camera on; and those before the last edge.
-        fn from_eye(&self) -> (Vec<PartialWeights>, PartialWeights) {
+        fn eye_weights(&self) -> (Vec<PartialWeights>, PartialWeights) {
             let mut weights = PartialWeights {
                 d_vcm: self.walks / self.on[0],
                 d_vc: 0.0,
@@ -227,7 +227,7 @@ mod tests {
         }
 
         /// Those of light subpaths, by vertex.
-        fn from_light(&self) -> Vec<PartialWeights> {
+        fn light_weights(&self) -> Vec<PartialWeights> {
             let last = self.edges();
             let emitted = self.emitted[0] * self.emitted[1];
             let mut weights = PartialWeights {
@@ -257,13 +257,13 @@ mod tests {
         /// Its weight with `eye` vertices from the eye, as the kernels have it.
         fn weight(&self, eye: usize) -> f64 {
             let n = self.edges() + 1;
-            let ((from_eye, before), from_light) = (self.from_eye(), self.from_light());
+            let ((eye_weights, before), light_weights) = (self.eye_weights(), self.light_weights());
             let emitted = self.emitted[0] * self.emitted[1];
             match (n - eye, eye) {
                 // A lamp that the camera sees is made in one way.
                 (0, 2) => 1.0,
                 (0, _) => {
-                    let w = if self.is_infinite() { before } else { from_eye[n - 1] };
+                    let w = if self.is_infinite() { before } else { eye_weights[n - 1] };
                     mis_weight(0.0, self.direct * w.d_vcm + emitted * w.d_vc)
                 }
                 (1, _) => {
@@ -272,19 +272,19 @@ mod tests {
                     let direct = self.direct / self.measure(edge, true);
                     let met = if self.has_extent() { self.on[at] / direct } else { 0.0 };
                     let walked = emitted / (direct * self.cosines[edge][1]) * self.cosines[edge][0];
-                    mis_weight(met, walked * from_eye[at].mis_behind(self.back[at]))
+                    mis_weight(met, walked * eye_weights[at].mis_behind(self.back[at]))
                 }
                 (_, 1) => {
                     let shown = self.on[0] * self.measure(0, true) / self.walks;
-                    mis_weight(shown * from_light[1].mis_behind(self.on[1]), 0.0)
+                    mis_weight(shown * light_weights[1].mis_behind(self.on[1]), 0.0)
                 }
                 (_, eye) => {
                     let (here, there) = (eye - 1, eye);
                     let to_light = self.on[here] * self.measure(here, true);
                     let to_eye = self.back[there] * self.measure(here, false);
                     mis_weight(
-                        to_light * from_light[there].mis_behind(self.on[there]),
-                        to_eye * from_eye[here].mis_behind(self.back[here]),
+                        to_light * light_weights[there].mis_behind(self.on[there]),
+                        to_eye * eye_weights[here].mis_behind(self.back[here]),
                     )
                 }
             }

@@ -329,7 +329,7 @@ impl Capture {
 
     fn read_impostor(&self, gpu: &Gpu) -> Result<ImpostorImage> {
         let distances: Vec<f32> = self.gbuffer.read(gpu, Output::Distance)?;
-        if distances.iter().any(|distance| !(*distance > 0.0)) {
+        if distances.iter().any(|distance| distance.is_nan() || *distance <= 0.0) {
             return Err(Error::setting("place", self.plan.place, "lies on a surface"));
         }
         let words: Vec<[u32; 2]> = self.gbuffer.read(gpu, Output::Normals)?;
@@ -421,6 +421,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[expect(clippy::single_range_in_vec_init, reason = "ranges of triangles, not their numbers")]
     fn parts_are_all_but_what_is_left_out() {
         let drawn = |count: u32, left_out: &[Range<u32>]| -> Vec<Range<u32>> {
             let parts = ranges_without(count, left_out);

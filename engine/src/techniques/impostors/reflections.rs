@@ -82,7 +82,7 @@ impl MapUse for LookUps {
 }
 
 /// The objects that reflect, by a setting.
-fn reflectors<'a>(objects: &'a [ObjectTriangles], wanted: Option<u32>) -> Result<Vec<&'a ObjectTriangles>> {
+fn reflectors(objects: &[ObjectTriangles], wanted: Option<u32>) -> Result<Vec<&ObjectTriangles>> {
     let Some(number) = wanted else {
         return Ok(objects.iter().filter(|object| object.mirrors).collect());
     };
