@@ -6,7 +6,7 @@ use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
 use clerestory::scene::{Camera, Scene};
 use clerestory::techniques::path::PathCounters;
-use clerestory::techniques::{PathTracer, PathTracerSettings};
+use clerestory::techniques::{PathTracer, PathTracerSettings, Technique};
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathSet};
 pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, floor_from_above, lamp, point_triangle};
@@ -192,6 +192,38 @@ pub fn render(gpu: &Gpu, scene: &Scene, size: [u32; 2], samples: u32, settings: 
     let picture = finish(&mut tracer(gpu, scene, size, settings), samples);
     picture.expect_sound(&scene.name, samples);
     picture
+}
+
+/// Goes on to that many samples per pixel, all of them finite and there, and reads radiance and variance.
+pub fn advance(technique: &mut impl Technique, samples: u32) -> [Vec<f32>; 2] {
+    while technique
+        .step(samples)
+        .unwrap_or_else(|error| panic!("{error}"))
+        .is_some()
+    {}
+    let (picture, non_finite) = technique.picture().unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(non_finite.total(), 0, "samples that are not finite");
+    let layer = |name: &str| {
+        picture
+            .layer(name)
+            .map_or_else(Vec::new, |layer| layer.values().to_vec())
+    };
+    let radiance = layer("radiance");
+    assert!(
+        !radiance.is_empty() && radiance.iter().all(|v| v.is_finite() && *v >= 0.0),
+        "radiance"
+    );
+    assert!(
+        layer("samples").iter().all(|n| *n == samples as f32),
+        "samples are missing"
+    );
+    [radiance, layer("variance")]
+}
+
+/// Mean of a channel over a picture.
+pub fn mean(radiance: &[f32], channel: usize) -> f64 {
+    let values = radiance.iter().skip(channel).step_by(3);
+    values.map(|value| f64::from(*value)).sum::<f64>() / (radiance.len() / 3) as f64
 }
 
 /// As [`scenes::pixel_averages`](clerestory_hard_cases::scenes::pixel_averages), with 16 × 16 points per pixel.

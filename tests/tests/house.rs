@@ -199,7 +199,7 @@ fn files_that_others_name_are_read_through_one_door() {
 /// Methods that may use another one's code and kernels: photon mapping's eye paths are the path tracer's, as are those that virtual lights light, which walks
 /// leave as photons do; bidirectional paths have the path tracer's camera rays and way to the film. Pictures by maps with distances are eye paths, too, and a
 /// localised gather has the same maps, which the preview's kernel shades.
-const METHODS_BESIDE: [[&str; 2]; 9] = [
+const METHODS_BESIDE: [[&str; 2]; 8] = [
     ["bidirectional", "path"],
     ["photon_mapping", "path"],
     ["instant_radiosity", "path"],
@@ -207,7 +207,6 @@ const METHODS_BESIDE: [[&str; 2]; 9] = [
     ["impostors", "path"],
     ["impostors", "preview"],
     ["localized_gather", "path"],
-    ["localized_gather", "preview"],
     ["localized_gather", "impostors"],
 ];
 

@@ -23,6 +23,45 @@ mod foresight;
 pub mod frame;
 mod skipped;
 
+/// What a [`Technique`] hands on to methods of the same names that the type has of its own, its settings as JSON; within the implementation.
+macro_rules! forward_to_methods {
+    ($type:ident) => {
+        fn step(&mut self, samples: u32) -> $crate::Result<Option<$crate::film::Step>> {
+            $type::step(self, samples)
+        }
+
+        fn picture(
+            &mut self,
+        ) -> $crate::Result<(
+            $crate::film::picture::Picture,
+            $crate::film::picture::NonFiniteSamples,
+        )> {
+            $type::picture(self)
+        }
+
+        fn display(
+            &mut self,
+            target: &$crate::gpu::Buffer,
+            exposure: f32,
+            format: $crate::film::PixelFormat,
+        ) -> $crate::Result<()> {
+            $type::display(self, target, exposure, format)
+        }
+
+        fn set_camera(&mut self, camera: &$crate::scene::Camera) -> $crate::Result<()> {
+            $type::set_camera(self, camera)
+        }
+
+        fn settings(&self) -> serde_json::Value {
+            $crate::settings::TypedSettings::to_json($type::settings(self))
+        }
+
+        fn pipelines(&self) -> Vec<$crate::gpu::PipelineInfo> {
+            $type::pipelines(self)
+        }
+    };
+}
+
 /// Declares the modules of techniques, and [`ALL`] of their cards: each has a constant `CARD`. A `+` stands before the card of a family's further method.
 macro_rules! methods {
     ($($module:ident,)* $(+ $family:ident::$card:ident,)*) => {

@@ -109,21 +109,6 @@ impl<'a> Easel<'a> {
         other
     }
 
-    /// The same with as many samples a pass as are wanted, or as the technique's setting allows.
-    pub fn with_pass_of(&self, samples: u32) -> Self {
-        self.with("samples_per_pass", self.samples_of_pass(samples))
-    }
-
-    /// As many samples a pass as are wanted, or as the technique's setting allows; where there is none, as pixels share the noise of.
-    pub fn samples_of_pass(&self, wanted: u32) -> u32 {
-        let infos = self.info.settings.infos();
-        let setting = infos.iter().find(|setting| setting.name == "samples_per_pass");
-        // The range is in words: its end is the last of them.
-        let most = setting.and_then(|setting| setting.range.split_whitespace().last()?.parse().ok());
-        let shared = self.pass_samples().ok().flatten();
-        wanted.min(most.or(shared).unwrap_or(u32::MAX))
-    }
-
     /// For scenes whose paths lose half of their light at each bounce: without the rare bright samples of early Russian roulette the
     /// means of few samples are near enough to normal for tests of single pixels.
     #[must_use]
@@ -141,7 +126,7 @@ impl<'a> Easel<'a> {
     }
 
     /// Samples of a pass, where the technique has no bias and all pixels share the noise of a pass: means over pictures are judged by those of their passes then.
-    fn pass_samples(&self) -> Result<Option<u32>> {
+    pub(crate) fn pass_samples(&self) -> Result<Option<u32>> {
         let law = (self.info.foresight.law)(&self.settings())?;
         Ok((law.shares_noise && !self.has_bias()).then_some(law.samples_a_pass))
     }
@@ -192,7 +177,7 @@ impl<'a> Easel<'a> {
     pub fn paint(&self, scene: &Scene, size: [u32; 2], spp: u32) -> Result<Painted> {
         let shared = self
             .pass_samples()?
-            .map(|_| self.with_pass_of(spp.min(PASS_SAMPLES_MAX)));
+            .map(|_| self.with("samples_per_pass", spp.min(PASS_SAMPLES_MAX)));
         let easel = shared.as_ref().unwrap_or(self);
         let painted = finish(easel.prepare(scene, size)?.as_mut(), spp)?;
         Ok(Painted {

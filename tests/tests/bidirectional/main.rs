@@ -13,7 +13,7 @@ use clerestory::gpu::Gpu;
 use clerestory::scene::{LightKind, Material, Scene};
 use clerestory::techniques::bidirectional::{BidirectionalPaths, BidirectionalSettings, Strategies};
 use clerestory::transport::random::SamplerKind;
-use clerestory_tests::render::{Rendered, builtin, cuboid, lamp, paths, render, upload};
+use clerestory_tests::render::{Rendered, advance, builtin, cuboid, lamp, mean, paths, render, upload};
 use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::{DAffine3, DVec3, Vec3};
@@ -40,37 +40,6 @@ fn renderer(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &BidirectionalSe
         Ok(renderer) => renderer,
         Err(error) => panic!("{}: {error}", scene.name),
     }
-}
-
-/// Goes on to that many samples per pixel, and reads radiance and variance.
-fn advance(renderer: &mut BidirectionalPaths, samples: u32) -> [Vec<f32>; 2] {
-    while renderer
-        .step(samples)
-        .unwrap_or_else(|error| panic!("{error}"))
-        .is_some()
-    {}
-    let (picture, non_finite) = renderer.picture().unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(non_finite.total(), 0, "samples that are not finite");
-    let layer = |name: &str| {
-        picture
-            .layer(name)
-            .map_or_else(Vec::new, |layer| layer.values().to_vec())
-    };
-    let radiance = layer("radiance");
-    assert!(
-        !radiance.is_empty() && radiance.iter().all(|v| v.is_finite() && *v >= 0.0),
-        "radiance"
-    );
-    assert!(
-        layer("samples").iter().all(|n| *n == samples as f32),
-        "samples are missing"
-    );
-    [radiance, layer("variance")]
-}
-
-fn mean(radiance: &[f32], channel: usize) -> f64 {
-    let values = radiance.iter().skip(channel).step_by(3);
-    values.map(|value| f64::from(*value)).sum::<f64>() / (radiance.len() / 3) as f64
 }
 
 /// A picture, the variance of its values, and the mean over it in each block of passes, by channel.

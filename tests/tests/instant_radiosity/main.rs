@@ -19,7 +19,7 @@ use clerestory::scene::{LightKind, Material, Scene};
 use clerestory::techniques::Technique;
 use clerestory::techniques::instant_radiosity::{Bound, Compensation, PassCounts, VirtualLightSettings, VirtualLights};
 use clerestory::transport::random::SamplerKind;
-use clerestory_tests::render::{Rendered, builtin, cuboid, paths, render, upload};
+use clerestory_tests::render::{Rendered, advance, builtin, cuboid, mean, paths, render, upload};
 use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::Vec3;
@@ -46,39 +46,12 @@ fn renderer(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &VirtualLightSet
     }
 }
 
-/// Goes on to that many samples per pixel, and reads radiance and variance.
-fn advance(renderer: &mut impl Technique, samples: u32) -> [Vec<f32>; 2] {
-    while renderer
-        .step(samples)
-        .unwrap_or_else(|error| panic!("{error}"))
-        .is_some()
-    {}
-    let (picture, non_finite) = renderer.picture().unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(non_finite.total(), 0, "samples that are not finite");
-    let layer = |name: &str| {
-        picture
-            .layer(name)
-            .map_or_else(Vec::new, |layer| layer.values().to_vec())
-    };
-    let radiance = layer("radiance");
-    assert!(
-        !radiance.is_empty() && radiance.iter().all(|v| v.is_finite() && *v >= 0.0),
-        "radiance"
-    );
-    [radiance, layer("variance")]
-}
-
 /// A picture, the variance of its values by the passes', and the mean over it in each pass, by channel.
 struct Passes {
     radiance: Vec<f32>,
     variance: Vec<f32>,
     means: [Vec<f64>; 3],
     counts: PassCounts,
-}
-
-fn mean(radiance: &[f32], channel: usize) -> f64 {
-    let values = radiance.iter().skip(channel).step_by(3);
-    values.map(|value| f64::from(*value)).sum::<f64>() / (radiance.len() / 3) as f64
 }
 
 fn passes(gpu: &Gpu, scene: &Scene, settings: &VirtualLightSettings, count: u32) -> Passes {

@@ -6,24 +6,19 @@ use super::mis;
 use super::renderer::BidirectionalPaths;
 use super::settings::BidirectionalSettings;
 use super::splats::sums_within;
-use crate::Result;
 use crate::catalogue::{Role, Row, sources};
-use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::bidirectional::{
     bdpt_add, bdpt_append, bdpt_camera, bdpt_connect, bdpt_emit, bdpt_scatter, bdpt_shade, bdpt_splat,
 };
 use crate::gpu::shaders::techniques::path::{path_camera, path_resolve};
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
-use crate::gpu::{Buffer, PipelineInfo};
-use crate::scene::{Camera, SceneProfile};
-use crate::settings::{SettingsDecl, TypedSettings};
+use crate::scene::SceneProfile;
+use crate::settings::SettingsDecl;
 use crate::techniques::path::unseen::unseen_of_lights;
 use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
 use crate::transport::{PathSet, SURFACE_FEATURES};
-
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "bdpt",
@@ -95,28 +90,10 @@ const KERNELS: [&ShaderInfo; 15] = [
 ];
 
 impl Technique for BidirectionalPaths {
-    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        BidirectionalPaths::step(self, samples)
-    }
-
-    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        BidirectionalPaths::picture(self)
-    }
-
-    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        BidirectionalPaths::display(self, target, exposure, format)
-    }
-
-    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        BidirectionalPaths::set_camera(self, camera)
-    }
+    forward_to_methods!(BidirectionalPaths);
 
     fn path_set(&self) -> PathSet {
         BidirectionalPaths::path_set(self)
-    }
-
-    fn settings(&self) -> serde_json::Value {
-        BidirectionalPaths::settings(self).to_json()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
@@ -135,10 +112,6 @@ impl Technique for BidirectionalPaths {
             ("vertices_in_view", c.vertices_in_view),
             ("connections", c.connections),
         ])
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        BidirectionalPaths::pipelines(self)
     }
 
     fn skipped(&self) -> Vec<Skipped> {

@@ -17,7 +17,11 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
 
+use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::constants::PACKED_NORMAL_BITS;
+use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert};
+use crate::gpu::shaders::techniques::path::path_directions;
+use crate::gpu::shaders::techniques::preview::preview_shade;
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::gpu::{Area, Buffer, BufferDesc, Category, Gpu, PipelineInfo, Timings};
 use crate::maps::impostor::ImpostorImage;
@@ -46,6 +50,17 @@ pub enum CaptureBy {
     /// By the path tracer: light of every kind, scattered as often as is asked for.
     Rays,
 }
+
+/// What the device of a map offers: octants are cut by clip distances.
+pub(in crate::techniques) const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"];
+
+/// What a map may take, beside what eye paths do.
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 4] = [
+    &path_directions::INFO,
+    &preview_shade::INFO,
+    &surface_octant_vert::INFO,
+    &surface_frag::INFO,
+];
 
 /// By how much paths begin in front of what a texel shows, as a part of its distance.
 const LEAD: f32 = 1.0 / 1024.0;

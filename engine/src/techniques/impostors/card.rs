@@ -3,31 +3,23 @@
 use std::collections::BTreeMap;
 
 use super::ImpostorReflections;
+use super::capture;
 use super::settings::ReflectionSettings;
-use crate::Result;
 use crate::catalogue::{Role, Row, sources};
-use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{PixelFormat, Step};
-use crate::gpu::interface::ShaderInfo;
-use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert};
 use crate::gpu::shaders::techniques::impostors::impostor_reflect;
-use crate::gpu::shaders::techniques::path::path_directions;
-use crate::gpu::shaders::techniques::preview::preview_shade;
-use crate::gpu::{Buffer, PipelineInfo};
-use crate::scene::{Camera, SceneProfile};
-use crate::settings::{SettingsDecl, TypedSettings};
+use crate::scene::SceneProfile;
+use crate::settings::SettingsDecl;
 use crate::techniques::path::card as path;
 use crate::techniques::{Bias, Card, Foresight, Skipped, Technique, Variant, reasons};
 use crate::transport::PathSet;
-
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "impostor",
     summary: "direct light, and reflections of smooth surfaces by a map of radiance and distance, in which reflected rays are followed",
     rows: &[ROWS],
     bias: BIAS,
-    needs: NEEDS,
-    kernels: &[&path::KERNELS, &KERNELS],
+    needs: capture::NEEDS,
+    kernels: &[&path::KERNELS, &capture::KERNELS, &[&impostor_reflect::INFO]],
     path_set: PathSet::DIRECT_AND_MIRRORED,
     refusals,
     settings: SettingsDecl::of::<ReflectionSettings>(),
@@ -55,18 +47,6 @@ const BIAS: Bias = Bias::Biased(
 /// The path set as path sets are written.
 const DISPLAYED: &str = "L(S?|[^S]|.S)E";
 
-/// Octants are cut by clip distances.
-const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"];
-
-/// What a picture may take with default settings, beside what eye paths do.
-const KERNELS: [&ShaderInfo; 5] = [
-    &impostor_reflect::INFO,
-    &path_directions::INFO,
-    &preview_shade::INFO,
-    &surface_octant_vert::INFO,
-    &surface_frag::INFO,
-];
-
 /// Why a scene cannot be modelled by a map of its surfaces.
 pub(in crate::techniques) fn refusals(profile: &SceneProfile) -> Vec<String> {
     reasons(&[
@@ -86,36 +66,14 @@ pub(in crate::techniques) fn refusals(profile: &SceneProfile) -> Vec<String> {
 }
 
 impl Technique for ImpostorReflections {
-    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        ImpostorReflections::step(self, samples)
-    }
-
-    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        ImpostorReflections::picture(self)
-    }
-
-    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        ImpostorReflections::display(self, target, exposure, format)
-    }
-
-    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        ImpostorReflections::set_camera(self, camera)
-    }
+    forward_to_methods!(ImpostorReflections);
 
     fn path_set(&self) -> PathSet {
         ImpostorReflections::path_set(self)
     }
 
-    fn settings(&self) -> serde_json::Value {
-        ImpostorReflections::settings(self).to_json()
-    }
-
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         ImpostorReflections::counters(self)
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        ImpostorReflections::pipelines(self)
     }
 
     fn skipped(&self) -> Vec<Skipped> {
@@ -143,7 +101,7 @@ const ROWS: &[Row] = &[
         ],
         path_set: Some(DISPLAYED),
         bias: Some(BIAS),
-        needs: NEEDS,
+        needs: capture::NEEDS,
         tests: &[
             "tests/tests/impostor_pictures/reflections.rs::mirrors_in_a_diffuse_room_show_what_the_path_tracer_shows",
             "tests/tests/impostor_pictures/reflections.rs::directions_err_as_published",
@@ -176,7 +134,7 @@ const ROWS: &[Row] = &[
         bias: Some(Bias::Biased(
             "radiance at texels' middles; the preview's shadows where it is drawn",
         )),
-        needs: NEEDS,
+        needs: capture::NEEDS,
         tests: &[
             "engine/src/techniques/impostors/capture.rs::parts_are_all_but_what_is_left_out",
             "tests/tests/impostor_pictures/reflections.rs::area_lights_and_skies_are_mirrored_by_rays",

@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::capture::{Capture, CaptureBy, CapturePlan, Captured, middle_of};
 use super::card::refusals;
-use super::renderer::{MapRenderer, MapUse};
+use super::renderer::{MapRenderer, MapUse, eye_settings};
 use super::settings::ReflectionSettings;
 use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -17,7 +17,7 @@ use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::raster::ObjectTriangles;
 use crate::scene::Camera;
 use crate::settings::TypedSettings;
-use crate::techniques::{PathTracer, PathTracerSettings, Skipped};
+use crate::techniques::{PathTracer, Skipped};
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::ArrivalStage;
 use crate::{Error, Result};
@@ -149,15 +149,7 @@ impl ImpostorReflections {
         let has_reflector = !plan.left_out.is_empty();
         let capture = has_reflector.then(|| Capture::new(gpu, &scene, plan)).transpose()?;
         let (path_set, eye) = (settings.path_set()?, settings.eye_paths()?);
-        let eye_settings = PathTracerSettings {
-            path_set: eye,
-            sampler: settings.sampler,
-            seed: settings.seed,
-            aovs: settings.aovs,
-            // Counts are read wave by wave.
-            full_waves: false,
-            ..PathTracerSettings::default()
-        };
+        let eye_settings = eye_settings(eye, settings.sampler, settings.seed, settings.aovs);
         let tracer = PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?;
         let look_ups = LookUps {
             settings: settings.clone(),

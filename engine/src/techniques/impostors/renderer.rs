@@ -11,8 +11,9 @@ use crate::gpu::shaders::techniques::path::path_shade;
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::Camera;
 use crate::techniques::skipped::skipped;
-use crate::techniques::{PathTracer, Skipped};
-use crate::transport::{GpuScene, SURFACE_FEATURES};
+use crate::techniques::{PathTracer, PathTracerSettings, Skipped};
+use crate::transport::random::SamplerKind;
+use crate::transport::{GpuScene, PathSet, SURFACE_FEATURES};
 use crate::walk::ArrivalStage;
 
 /// What eye paths do with a map.
@@ -25,6 +26,24 @@ pub(in crate::techniques) trait MapUse: Send {
     fn count(&mut self) -> Result<()>;
     fn counters(&self) -> BTreeMap<&'static str, u64>;
     fn pipelines(&self) -> Vec<PipelineInfo>;
+}
+
+/// Settings of eye paths whose stage looks a map up.
+pub(in crate::techniques) fn eye_settings(
+    path_set: PathSet,
+    sampler: SamplerKind,
+    seed: u32,
+    aovs: bool,
+) -> PathTracerSettings {
+    PathTracerSettings {
+        path_set,
+        sampler,
+        seed,
+        aovs,
+        // Counts are read wave by wave.
+        full_waves: false,
+        ..PathTracerSettings::default()
+    }
 }
 
 /// A progressive rendering of one view by a map and eye paths.

@@ -7,20 +7,16 @@ use super::renderer::VirtualLights;
 use super::settings::VirtualLightSettings;
 use crate::Result;
 use crate::catalogue::{Role, Row, sources};
-use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::instant_radiosity::{vpl_append, vpl_gather};
 use crate::gpu::shaders::techniques::path::path_shade;
 use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
-use crate::gpu::{Buffer, PipelineInfo};
-use crate::scene::{Camera, SceneProfile};
-use crate::settings::{Settings, SettingsDecl, TypedSettings};
+use crate::scene::SceneProfile;
+use crate::settings::{Settings, SettingsDecl};
 use crate::techniques::path::card as path;
 use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
 use crate::transport::{PathSet, SURFACE_FEATURES};
-
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "vpl",
@@ -84,28 +80,10 @@ const KERNELS: [&ShaderInfo; 4] = [
 ];
 
 impl Technique for VirtualLights {
-    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        VirtualLights::step(self, samples)
-    }
-
-    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        VirtualLights::picture(self)
-    }
-
-    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        VirtualLights::display(self, target, exposure, format)
-    }
-
-    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        VirtualLights::set_camera(self, camera)
-    }
+    forward_to_methods!(VirtualLights);
 
     fn path_set(&self) -> PathSet {
         VirtualLights::path_set(self)
-    }
-
-    fn settings(&self) -> serde_json::Value {
-        VirtualLights::settings(self).to_json()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
@@ -130,10 +108,6 @@ impl Technique for VirtualLights {
             ("gathers", c.gather.gathers),
             ("connections", c.gather.connections),
         ])
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        VirtualLights::pipelines(self)
     }
 
     fn skipped(&self) -> Vec<Skipped> {

@@ -4,31 +4,22 @@ use std::collections::BTreeMap;
 
 use super::LocalizedGather;
 use super::settings::LocalizedGatherSettings;
-use crate::Result;
 use crate::catalogue::{Role, Row, sources};
-use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{PixelFormat, Step};
-use crate::gpu::interface::ShaderInfo;
-use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert};
 use crate::gpu::shaders::techniques::localized_gather::localized_gather;
-use crate::gpu::shaders::techniques::path::path_directions;
-use crate::gpu::shaders::techniques::preview::preview_shade;
-use crate::gpu::{Buffer, PipelineInfo};
-use crate::scene::{Camera, SceneProfile};
-use crate::settings::{SettingsDecl, TypedSettings};
-use crate::techniques::impostors;
+use crate::scene::SceneProfile;
+use crate::settings::SettingsDecl;
+use crate::techniques::impostors::{self, capture};
 use crate::techniques::path::card as path;
 use crate::techniques::{Bias, Card, Foresight, Skipped, Technique, Variant, reasons};
 use crate::transport::PathSet;
-
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "localized-gather",
     summary: "direct light, and light of one scattering more from the texels of a coarse map as area lights, seen from each point",
     rows: &[ROWS],
     bias: BIAS,
-    needs: NEEDS,
-    kernels: &[&path::KERNELS, &KERNELS],
+    needs: capture::NEEDS,
+    kernels: &[&path::KERNELS, &capture::KERNELS, &[&localized_gather::INFO]],
     path_set: PathSet::DIRECT_AND_ROUGH,
     refusals,
     settings: SettingsDecl::of::<LocalizedGatherSettings>(),
@@ -56,18 +47,6 @@ const BIAS: Bias = Bias::Biased(
 /// The path set as path sets are written.
 const DISPLAYED: &str = "L([SV]?|.?[DG])E";
 
-/// Octants are cut by clip distances.
-const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"];
-
-/// What a picture may take with default settings, beside what eye paths do.
-const KERNELS: [&ShaderInfo; 5] = [
-    &localized_gather::INFO,
-    &path_directions::INFO,
-    &preview_shade::INFO,
-    &surface_octant_vert::INFO,
-    &surface_frag::INFO,
-];
-
 /// Why a scene cannot be modelled.
 pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
     let mut all = impostors::refusals(profile);
@@ -85,36 +64,14 @@ pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
 }
 
 impl Technique for LocalizedGather {
-    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        LocalizedGather::step(self, samples)
-    }
-
-    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        LocalizedGather::picture(self)
-    }
-
-    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        LocalizedGather::display(self, target, exposure, format)
-    }
-
-    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        LocalizedGather::set_camera(self, camera)
-    }
+    forward_to_methods!(LocalizedGather);
 
     fn path_set(&self) -> PathSet {
         LocalizedGather::path_set(self)
     }
 
-    fn settings(&self) -> serde_json::Value {
-        LocalizedGather::settings(self).to_json()
-    }
-
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         LocalizedGather::counters(self)
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        LocalizedGather::pipelines(self)
     }
 
     fn skipped(&self) -> Vec<Skipped> {
@@ -138,7 +95,7 @@ const ROWS: &[Row] = &[Row {
     ],
     path_set: Some(DISPLAYED),
     bias: Some(BIAS),
-    needs: NEEDS,
+    needs: capture::NEEDS,
     tests: &[
         "tests/tests/impostor_pictures/gathers.rs::diffuse_rooms_have_the_path_tracers_light_within_the_stated_bias",
         "tests/tests/impostor_pictures/gathers.rs::emission_is_never_counted_twice",

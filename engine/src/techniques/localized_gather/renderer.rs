@@ -16,8 +16,8 @@ use crate::maps::gather::GatherLights;
 use crate::scene::Camera;
 use crate::settings::TypedSettings;
 use crate::techniques::impostors::capture::{Capture, CapturePlan, Captured, middle_of};
-use crate::techniques::impostors::renderer::{MapRenderer, MapUse};
-use crate::techniques::{PathTracer, PathTracerSettings, Skipped};
+use crate::techniques::impostors::renderer::{MapRenderer, MapUse, eye_settings};
+use crate::techniques::{PathTracer, Skipped};
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::ArrivalStage;
 use crate::{Error, Result};
@@ -138,15 +138,7 @@ impl LocalizedGather {
         let has_light = surfaces.triangles > 0 && scene.has_lights();
         let capture = has_light.then(|| Capture::new(gpu, &scene, plan)).transpose()?;
         let path_set = settings.path_set()?;
-        let eye_settings = PathTracerSettings {
-            path_set: PathSet::UP_TO_DIRECT,
-            sampler: settings.sampler,
-            seed: settings.seed,
-            aovs: settings.aovs,
-            // Counts are read wave by wave.
-            full_waves: false,
-            ..PathTracerSettings::default()
-        };
+        let eye_settings = eye_settings(PathSet::UP_TO_DIRECT, settings.sampler, settings.seed, settings.aovs);
         let tracer = PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?;
         let gathering = Gathering {
             settings: settings.clone(),

@@ -4,23 +4,18 @@ use std::collections::BTreeMap;
 
 use crate::Result;
 use crate::catalogue::{Role, Row, sources};
-use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::{
     path_camera, path_medium, path_numbers, path_refill, path_resolve, path_resolve_shares, path_retire, path_shade,
 };
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
-use crate::gpu::{Buffer, PipelineInfo};
-use crate::scene::Camera;
-use crate::settings::{Settings, SettingsDecl, TypedSettings};
+use crate::settings::{Settings, SettingsDecl};
 use crate::techniques::path::adaptive::LIKE_PILOTS;
 use crate::techniques::path::unseen::unseen_by_eye_paths;
 use crate::techniques::path::{Adaptive, PathTracer, PathTracerSettings};
 use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant};
 use crate::transport::{COMPENSATION, METAL_LOBES, PathSet, SURFACE_FEATURES};
-
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "path",
@@ -94,28 +89,10 @@ const FETCHED_TEXELS: [&str; 4] = ["extend_texels", "medium_texels", "shade_texe
 const FETCHED_BYTES: [&str; 4] = ["extend_bytes", "medium_bytes", "shade_bytes", "shadow_bytes"];
 
 impl Technique for PathTracer {
-    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        PathTracer::step(self, samples)
-    }
-
-    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        PathTracer::picture(self)
-    }
-
-    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        PathTracer::display(self, target, exposure, format)
-    }
-
-    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        PathTracer::set_camera(self, camera)
-    }
+    forward_to_methods!(PathTracer);
 
     fn path_set(&self) -> PathSet {
         PathTracer::settings(self).path_set
-    }
-
-    fn settings(&self) -> serde_json::Value {
-        PathTracer::settings(self).to_json()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
@@ -138,10 +115,6 @@ impl Technique for PathTracer {
             all.extend(FETCHED_BYTES.into_iter().zip(c.fetches.bytes));
         }
         all
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        PathTracer::pipelines(self)
     }
 
     fn skipped(&self) -> Vec<Skipped> {

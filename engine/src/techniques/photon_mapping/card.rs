@@ -6,23 +6,19 @@ use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer};
 use crate::Result;
 use crate::accel::photon_map::device::MapBuilder;
 use crate::catalogue::{Role, Row, sources};
-use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{PixelFormat, Step};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::path_shade;
 use crate::gpu::shaders::techniques::photon_mapping::{
     photon_append, photon_boxes, photon_emit, photon_gather, photon_gather_packet, photon_leaf_size, photon_leaves,
     photon_scatter,
 };
-use crate::gpu::{Buffer, PipelineInfo};
 use crate::kernels::{RadixSort, Scan};
-use crate::scene::{Camera, SceneProfile};
-use crate::settings::{Settings, SettingsDecl, TypedSettings};
+use crate::scene::SceneProfile;
+use crate::settings::{Settings, SettingsDecl};
 use crate::techniques::path::card as path;
 use crate::techniques::skipped::{Omission, skipped};
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant};
 use crate::transport::{PathSet, SURFACE_FEATURES};
-
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "photon",
@@ -122,28 +118,10 @@ const QUERY_FEATURES: [Omission; 2] = [
 ];
 
 impl Technique for PhotonMapper {
-    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        PhotonMapper::step(self, samples)
-    }
-
-    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        PhotonMapper::picture(self)
-    }
-
-    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        PhotonMapper::display(self, target, exposure, format)
-    }
-
-    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        PhotonMapper::set_camera(self, camera)
-    }
+    forward_to_methods!(PhotonMapper);
 
     fn path_set(&self) -> PathSet {
         PhotonMapper::settings(self).path_set
-    }
-
-    fn settings(&self) -> serde_json::Value {
-        PhotonMapper::settings(self).to_json()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
@@ -166,10 +144,6 @@ impl Technique for PhotonMapper {
             ("map_queries", c.gather.queries),
             ("photons_gathered", c.gather.photons),
         ])
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        PhotonMapper::pipelines(self)
     }
 
     fn skipped(&self) -> Vec<Skipped> {

@@ -31,9 +31,11 @@ fn scene() -> Scene {
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     // Nothing is scattered: bounces beyond the first are not even recorded.
-    let easel = easel.with("path_set", "bounces=0..1").with_pass_of(SAMPLES_PER_PASS);
+    let easel = easel
+        .with("path_set", "bounces=0..1")
+        .with("samples_per_pass", SAMPLES_PER_PASS);
     // Fewer where passes have few.
-    let share = SAMPLES_PER_PASS / easel.samples_of_pass(SAMPLES_PER_PASS);
+    let share = SAMPLES_PER_PASS / easel.pass_samples()?.unwrap_or(SAMPLES_PER_PASS);
     for (size, samples) in [([1, 1], 1_000_000), ([2, 2], 20_000)] {
         let painted = easel.paint(&scene(), size, samples / share)?;
         judgement.exactly(&format!("{size:?}"), &painted, [VALUE; 3]);

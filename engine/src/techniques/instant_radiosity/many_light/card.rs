@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Interleaving, ManyLight, ManyLightSettings, Visibility};
 use crate::catalogue::{Role, Row, sources};
-use crate::film::picture::{NonFiniteSamples, Picture};
-use crate::film::{PixelFormat, Step};
+use crate::gpu::Caps;
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::raster::{surface_frag, surface_vert};
 use crate::gpu::shaders::techniques::instant_radiosity::{
@@ -14,15 +13,13 @@ use crate::gpu::shaders::techniques::instant_radiosity::{
 use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
 use crate::gpu::shaders::types::GatherState;
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend};
-use crate::gpu::{Buffer, Caps, PipelineInfo};
-use crate::scene::{Camera, SceneProfile};
-use crate::settings::{Settings, SettingsDecl, TypedSettings};
+use crate::scene::SceneProfile;
+use crate::settings::{Settings, SettingsDecl};
 use crate::techniques::foresight::frame_fits;
 use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
 use crate::transport::{PathSet, SURFACE_FEATURES};
 use crate::{Error, Result};
-
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Biased(
     "what the bound of the geometry term leaves out is not compensated; the filter averages the light of neighbouring pixels on a surface; \
@@ -118,28 +115,10 @@ pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
 }
 
 impl Technique for ManyLight {
-    fn step(&mut self, samples: u32) -> Result<Option<Step>> {
-        ManyLight::step(self, samples)
-    }
-
-    fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
-        ManyLight::picture(self)
-    }
-
-    fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
-        ManyLight::display(self, target, exposure, format)
-    }
-
-    fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        ManyLight::set_camera(self, camera)
-    }
+    forward_to_methods!(ManyLight);
 
     fn path_set(&self) -> PathSet {
         ManyLight::path_set(self)
-    }
-
-    fn settings(&self) -> serde_json::Value {
-        ManyLight::settings(self).to_json()
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
@@ -157,10 +136,6 @@ impl Technique for ManyLight {
             ("passes", c.passes),
             ("bytes_between_passes", self.bytes()),
         ])
-    }
-
-    fn pipelines(&self) -> Vec<PipelineInfo> {
-        ManyLight::pipelines(self)
     }
 
     fn skipped(&self) -> Vec<Skipped> {
