@@ -4,6 +4,7 @@
 
 #include "accel/trace_interface.glsl"
 #include "accel/index.glsl"
+#include "wide_counter.glsl"
 
 layout(constant_id = 106) const bool TRACE_ANY = false;
 
@@ -28,29 +29,23 @@ uint trace_ray(uint index) {
     return resume == INDEX_FINISHED ? 0u : 1u;
 }
 
-// Adds to a counter of two words: whoever carries the low word over adds the carry.
-#define TRACE_ADD_WIDE(counter, more) \
-    if (atomicAdd(counter[0], more) > 0xFFFFFFFFu - (more)) { \
-        atomicAdd(counter[1], 1u); \
-    }
-
 // Adds what an invocation has done.
 void trace_account(uint unfinished) {
     if (unfinished > 0u) {
         atomicAdd(trace_status.unfinished, unfinished);
     }
     if (INDEX_COUNT) {
-        TRACE_ADD_WIDE(trace_status.node_visits, index_counters.nodes);
-        TRACE_ADD_WIDE(trace_status.triangle_tests, index_counters.triangles);
-        TRACE_ADD_WIDE(trace_status.iterations, index_counters.iterations);
+        COUNT_WIDE(trace_status.node_visits, index_counters.nodes);
+        COUNT_WIDE(trace_status.triangle_tests, index_counters.triangles);
+        COUNT_WIDE(trace_status.iterations, index_counters.iterations);
         if (INDEX_KIND == INDEX_KD) {
-            TRACE_ADD_WIDE(trace_status.kd_leaves, index_counters.leaves);
-            TRACE_ADD_WIDE(trace_status.kd_pushes, index_counters.pushes);
-            TRACE_ADD_WIDE(trace_status.kd_pops, index_counters.pops);
-            TRACE_ADD_WIDE(trace_status.kd_restarts, index_counters.restarts);
-            TRACE_ADD_WIDE(trace_status.kd_cached_nodes, index_counters.cached_nodes);
-            TRACE_ADD_WIDE(trace_status.kd_register_pushes, index_counters.register_pushes);
-            TRACE_ADD_WIDE(trace_status.kd_register_pops, index_counters.register_pops);
+            COUNT_WIDE(trace_status.kd_leaves, index_counters.leaves);
+            COUNT_WIDE(trace_status.kd_pushes, index_counters.pushes);
+            COUNT_WIDE(trace_status.kd_pops, index_counters.pops);
+            COUNT_WIDE(trace_status.kd_restarts, index_counters.restarts);
+            COUNT_WIDE(trace_status.kd_cached_nodes, index_counters.cached_nodes);
+            COUNT_WIDE(trace_status.kd_register_pushes, index_counters.register_pushes);
+            COUNT_WIDE(trace_status.kd_register_pops, index_counters.register_pops);
         }
     }
 }

@@ -15,6 +15,7 @@
 
 #include "accel/ray.glsl"
 #include "scene/fetches.glsl"
+#include "wide_counter.glsl"
 
 // descriptor set 0: WaveSet
 
@@ -174,12 +175,7 @@ layout(set = 0, binding = 21, scalar) restrict buffer WalkMediumCounters {
 // wave that is kept full also the round that the walk began in, and a number of its owner's; 0 stands for the round elsewhere.
 layout(set = 0, binding = 22) uniform utextureBuffer walk_numbers_in;
 
-#define COUNT_MEDIUM(COUNTER, AMOUNT) { \
-    uint counted_amount = AMOUNT; \
-    if (counted_amount > 0u && atomicAdd(medium_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
-        atomicAdd(medium_counters.COUNTER[1], 1u); \
-    } \
-}
+#define COUNT_MEDIUM(COUNTER, AMOUNT) COUNT_WIDE(medium_counters.COUNTER, AMOUNT)
 
 #define ADD_WIDE(COUNTER, STAGE, AMOUNT) { \
     uint added = AMOUNT; \

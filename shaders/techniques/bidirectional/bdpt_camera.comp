@@ -137,8 +137,8 @@ void main() {
     Ray ray;
     vec3 radiance = splat(load_light_vertex(index), words, pixel, ray);
     if (cursor == INDEX_START) {
-        COUNT_WIDE(connections, pixel != SPLAT_NONE ? 1u : 0u)
-        COUNT_WIDE(shadow_rays, radiance != vec3(0.0) ? 1u : 0u)
+        COUNT_WIDE(bdpt_counters.connections, pixel != SPLAT_NONE ? 1u : 0u)
+        COUNT_WIDE(bdpt_counters.shadow_rays, radiance != vec3(0.0) ? 1u : 0u)
     }
     if (radiance == vec3(0.0)) {
         light_splats[index] = LightSplat(vec3(0.0), SPLAT_NONE);

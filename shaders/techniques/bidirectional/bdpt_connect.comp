@@ -195,8 +195,8 @@ void main() {
     uint first = at.next;
     uint rays;
     connect(r, slot, at, rays);
-    COUNT_WIDE(connections, at.next - first)
-    COUNT_WIDE(shadow_rays, rays)
+    COUNT_WIDE(bdpt_counters.connections, at.next - first)
+    COUNT_WIDE(bdpt_counters.shadow_rays, rays)
     if (!goes_on) {
         count_work(index_iterations + CONNECT_ITERATIONS * CONNECTIONS, WORK_UNIT);
     }

@@ -22,10 +22,7 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 #include "walk/draws.glsl"
-
-// From this bounce on no walk is sure to go on.
-const uint CAPPED_BOUNCE = 8u;
-const float SURVIVAL_MAX = 0.95;
+#include "walk/survival.glsl"
 
 // Scatters the walk of a slot at its hit; true when it goes on.
 bool scatter(uint slot, uint place, WalkState walk, inout uint flags) {
@@ -81,8 +78,7 @@ bool scatter(uint slot, uint place, WalkState walk, inout uint flags) {
         weights = mis_scatter_delta(weights, cos_out, ratio);
     }
     vec3 power = walk.throughput * share;
-    float most = walk.bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
-    float survival = min(largest_component(power) / largest_component(walk.throughput), most);
+    float survival = walk_survival(walk.throughput, power, walk.bounce);
     // Also ends a walk whose power is not a number.
     if (!(side.y < survival)) {
         return false;

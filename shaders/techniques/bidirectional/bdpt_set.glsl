@@ -6,6 +6,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 
 #include "techniques/bidirectional/bdpt_mis.glsl"
+#include "wide_counter.glsl"
 
 // descriptor set 3: BidirectionalSet
 
@@ -70,13 +71,6 @@ layout(set = 3, binding = 4, scalar) restrict buffer BidirectionalCounters {
 } bdpt_counters;
 layout(set = 3, binding = 5, scalar) restrict buffer LightSplats { LightSplat light_splats[]; };  // by vertex
 layout(set = 3, binding = 6, scalar) restrict buffer SplatSums { SplatSum splat_sums[]; };        // by group, then pixel
-
-#define COUNT_WIDE(COUNTER, AMOUNT) { \
-    uint counted_amount = AMOUNT; \
-    if (counted_amount > 0u && atomicAdd(bdpt_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
-        atomicAdd(bdpt_counters.COUNTER[1], 1u); \
-    } \
-}
 
 LightVertex load_light_vertex(uint index) {
     int first = int(LIGHT_VERTEX_QUARTERS * index);

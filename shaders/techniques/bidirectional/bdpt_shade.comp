@@ -28,6 +28,7 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 #include "techniques/bidirectional/bdpt_eye.glsl"
+#include "techniques/path/path_roulette.glsl"
 #include "walk/draws.glsl"
 
 // Densities that are looked up at a vertex, one behind the other, so that their code is there once.
@@ -43,20 +44,6 @@ bool counts(uint bounces) { return bounces >= push.least_bounces && bounces <= p
 // Weight of what one strategy has found, whose other ways weigh so much.
 float strategy_weight(uint strategy, float to_light, float to_eye) {
     return STRATEGY == STRATEGY_COMBINED ? mis_weight(to_light, to_eye) : (STRATEGY == strategy ? 1.0 : 0.0);
-}
-
-// Whether the path goes on, by a number in [0, 1); weights it if it does.
-bool roulette(inout WalkState path, float u) {
-    if (path.bounce < push.roulette_start) {
-        return true;
-    }
-    float survival = min(largest_component(path.throughput) * path.eta_scale, push.roulette_cap);
-    // Also ends a path whose throughput is not a number.
-    if (!(u < survival)) {
-        return false;
-    }
-    path.throughput /= survival;
-    return true;
 }
 
 // Shades the hit of the path in a slot. What it meets is added to `radiance`; `flags` say what waits at the place, and whether the path goes on.
@@ -166,7 +153,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : OUTSIDE;
     }
     path.bounce = bounce + 1u;
-    if (!roulette(path, side.y)) {
+    if (!path_roulette(path, side.y)) {
         return;
     }
     if (scattered.pdf > 0.0) {

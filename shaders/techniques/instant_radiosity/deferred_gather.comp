@@ -18,6 +18,7 @@ layout(local_size_x = 64) in;
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/seen.glsl"
 #include "techniques/instant_radiosity/visibility.glsl"
+#include "wide_counter.glsl"
 
 layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;  // of a place, in a dispatch
 layout(constant_id = 143) const uint VISIBILITY = VISIBILITY_RAYS;
@@ -57,13 +58,6 @@ layout(set = 0, binding = 4, scalar) restrict buffer DeferredCounters {
     uint connections[2];   // 64 bits, low word first: pairs of a place and a light
     uint tests[2];         // of visibility: pairs that might bring light
 } deferred_counters;
-
-#define COUNT_WIDE(COUNTER, AMOUNT) { \
-    uint counted_amount = AMOUNT; \
-    if (atomicAdd(deferred_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
-        atomicAdd(deferred_counters.COUNTER[1], 1u); \
-    } \
-}
 
 // Prepares the receiver of a place; false where nothing is gathered.
 bool begin_receiver(uint place, out Receiver r) {
@@ -167,8 +161,8 @@ void main() {
     if (KEEPS_COLORS) {
         split_colors[place] = scattered_color(r);
     }
-    COUNT_WIDE(connections, at.light - first)
-    COUNT_WIDE(tests, tests)
+    COUNT_WIDE(deferred_counters.connections, at.light - first)
+    COUNT_WIDE(deferred_counters.tests, tests)
     if (at.light < end) {
         atomicAdd(deferred_counters.remaining, 1u);
     }

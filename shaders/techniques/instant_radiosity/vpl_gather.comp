@@ -17,6 +17,7 @@ layout(local_size_x = 64) in;
 #include "transport/features.glsl"
 #include "walk/wave.glsl"
 #include "transport/path_set.glsl"
+#include "wide_counter.glsl"
 
 layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
 layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // of a place, in a dispatch
@@ -61,13 +62,6 @@ const uint GATHER_STOPPED = 0xFFFFFFFEu;
 const uint GATHER_DONE = 0xFFFFFFFCu;
 // Tells the candidates of these rays from those of the paths' own.
 const uint GATHER_SEED = 0x76706c73u;
-
-#define COUNT_WIDE(COUNTER, AMOUNT) { \
-    uint counted_amount = AMOUNT; \
-    if (atomicAdd(gather_counters.COUNTER[0], counted_amount) > 0xFFFFFFFFu - counted_amount) { \
-        atomicAdd(gather_counters.COUNTER[1], 1u); \
-    } \
-}
 
 uint arriving_bounce(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
 uint arriving_state(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }
@@ -156,8 +150,8 @@ void main() {
     uint first = at.light;
     uint rays;
     gather(r, at, rays);
-    COUNT_WIDE(connections, at.light - first)
-    COUNT_WIDE(shadow_rays, rays)
+    COUNT_WIDE(gather_counters.connections, at.light - first)
+    COUNT_WIDE(gather_counters.shadow_rays, rays)
     if (!goes_on) {
         count_work(index_iterations + CONNECTION_ITERATIONS * LIGHTS_AT_ONCE, WORK_UNIT);
     }

@@ -1,4 +1,4 @@
-// What the stages of a bounce have in common: push constants, and Russian roulette.
+// What the stages of a bounce have in common: push constants.
 #ifndef CLERESTORY_TECHNIQUES_PATH_PATH_BOUNCE_GLSL
 #define CLERESTORY_TECHNIQUES_PATH_PATH_BOUNCE_GLSL
 
@@ -20,19 +20,6 @@ layout(push_constant, scalar) uniform Push {
     float edge_bound;       // of EDGE_BOUND, beyond which paths have the light of an edge
 } push;
 
-// Whether a path that has been scattered goes on, by a number in [0, 1); weights it if it does.
-bool path_roulette(inout WalkState path, float u) {
-    if (path.bounce < push.roulette_start) {
-        return true;
-    }
-    vec3 t = path.throughput * path.eta_scale;
-    float survival = min(max(t.x, max(t.y, t.z)), push.roulette_cap);
-    // Also ends a path whose throughput is not a number.
-    if (!(u < survival)) {
-        return false;
-    }
-    path.throughput /= survival;
-    return true;
-}
+#include "techniques/path/path_roulette.glsl"
 
 #endif

@@ -258,9 +258,7 @@ void main() {
     if (!LINEAR || push.first == 0u) {
         atomicAdd(gather_counters.queries, 1u);
     }
-    if (atomicAdd(gather_counters.photons[0], gathered_photons) > 0xFFFFFFFFu - gathered_photons) {
-        atomicAdd(gather_counters.photons[1], 1u);
-    }
+    COUNT_WIDE(gather_counters.photons, gathered_photons)
     walk_gathered[slot].radiance += throughput * gathered * push.scale;
 }
 

@@ -31,13 +31,10 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 #include "walk/draws.glsl"
+#include "walk/survival.glsl"
 
 // Least axis of a kernel, in errors of its position: far from the origin positions lie on a grid, which a kernel must not fall through.
 const float KERNEL_RESOLUTION = 4.0;
-// From this bounce on no photon is sure to go on.
-const uint CAPPED_BOUNCE = 8u;
-const float SURVIVAL_MAX = 0.95;
-
 // Steps of a band in a record, over the power of two below the largest band (packing.glsl).
 const float FLUX_STEP_SHARE = 1.0 / 256.0;
 // Below this power of two steps are the same.
@@ -185,11 +182,10 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
         flux *= adjoint_ratio(frame.z, s.geometric_normal, a.wo, wi);
     }
-    // Between lossless surfaces photons end by SURVIVAL_MAX alone. Also ends a photon whose flux is not a number.
-    float most = bounce < CAPPED_BOUNCE ? 1.0 : SURVIVAL_MAX;
-    float survival = min(largest_component(flux) / largest_component(photon.throughput), most);
+    float survival = walk_survival(photon.throughput, flux, bounce);
     // Eye paths alone keep a scale of radiance: a photon's number stands there, made uniform again by each roulette.
     float draw = EVEN_SURVIVAL ? photon.eta_scale : side.y;
+    // Also ends a photon whose flux is not a number.
     if (!(draw < survival)) {
         return false;
     }
