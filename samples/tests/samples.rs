@@ -350,6 +350,73 @@ fn the_viewer_refuses_what_it_does_not_know() {
     }
 }
 
+/// The last frame of `many_lights`, and what it said.
+fn many_lights(arguments: &[&str]) -> (image::RgbImage, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    let arguments = [&["--size", "64x64", "--lights", "64"], arguments].concat();
+    let output = windowed(env!("CARGO_BIN_EXE_many_lights"), &arguments, &path);
+    assert!(output.status.success(), "{}", said(&output));
+    (open(&path), said(&output))
+}
+
+#[test]
+fn the_lamp_of_many_lights_goes_around() {
+    // Where the floor is brightest.
+    let brightest = |frames: &str| {
+        let (picture, _) = many_lights(&["--turn", "90", "--frames", frames]);
+        [[0.05, 0.35], [0.65, 0.95]].map(|across| mean(&picture, across, [0.5, 0.95])[0])
+    };
+    let [first, third] = ["1", "3"].map(brightest);
+    // The circle begins at the right and half a round later is at the left.
+    assert!(first[1] / first[0] > 1.1 * third[1] / third[0], "{first:?} {third:?}");
+}
+
+#[test]
+fn the_keys_of_many_lights_change_its_frames() {
+    let still = ["--turn", "0", "--frames", "4"];
+    let shown = |keys: &str| many_lights(&[&still[..], &["--keys", keys]].concat());
+    let light = |picture: &image::RgbImage| mean(picture, [0.0, 1.0], [0.0, 1.0])[0];
+    let (all, text) = shown("");
+    for expected in [
+        "64 walks",
+        "visibility Rays",
+        "bound Geometry",
+        "filter on",
+        "all light",
+    ] {
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+    // Of the light of lamps alone there is less, and what is left of it is what virtual lights bring.
+    let [(lamps, text), (indirect, more)] = [shown("p"), shown("pp")];
+    assert!(text.contains("light of lamps") && more.contains("light of virtual lights"));
+    assert!(
+        light(&lamps) < light(&all) && light(&indirect) < light(&all),
+        "{} {} {}",
+        light(&lamps),
+        light(&indirect),
+        light(&all)
+    );
+    // Without visibility light goes through the boxes.
+    let (through, text) = shown("vvppb+f");
+    for expected in [
+        "128 walks",
+        "visibility None",
+        "bound Distance",
+        "filter off",
+        "light of virtual lights",
+    ] {
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+    assert!(
+        light(&through) > 1.02 * light(&indirect),
+        "{} {}",
+        light(&through),
+        light(&indirect)
+    );
+    assert!(shown("-").1.contains("32 walks"));
+}
+
 /// The last frame of the photon viewer, and what it said.
 fn photon_viewer(arguments: &[&str]) -> (image::RgbImage, String) {
     let folder = tempfile::tempdir().unwrap();

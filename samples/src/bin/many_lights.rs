@@ -1,0 +1,241 @@
+//! A window on a scene whose lamp moves, lit anew in every frame by many virtual lights.
+//!
+//! `many_lights [SCENE] [--lights N] [--visibility none|rays|maps] [--bound none|geometry|distance] [--interleave TILES] [--turn DEGREES] [--camera NAME]
+//! [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--keys KEYS] [--screenshot FILE]`
+//!
+//! Each frame the lamp goes around the middle of the scene by `--turn`, its virtual lights are left anew where its light lands, and every pixel gathers the light
+//! of its part of them. Space holds the lamp, and the picture converges. V goes on to the next way to tell who sees a virtual light, B to the next bound of its
+//! brightness up close, + and - double and halve the lights, F shows the tiles without their filter, P goes on to the next part of the light: all, what lamps send
+//! directly, or what virtual lights bring. Otherwise as the viewer.
+//!
+//! Source of the program's form: S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR 2007.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Instant;
+
+use clerestory::film::PixelFormat;
+use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
+use clerestory::settings::TypedSettings;
+use clerestory::techniques;
+use clerestory::techniques::instant_radiosity::Bound;
+use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Visibility};
+use clerestory::transport::{GpuScene, PathSet};
+use clerestory::{Error, Result};
+use clerestory_samples::arguments::Arguments;
+use clerestory_samples::carousel::Carousel;
+use clerestory_samples::orbit::{Orbit, Pose};
+use clerestory_samples::window::{self, Canvas, Show, Shown};
+use winit::keyboard::{Key, NamedKey};
+
+const SCENE: &str = "builtin:cornell-box?source=point";
+/// Walks per frame, unless told otherwise.
+const LIGHTS: u32 = 256;
+/// Walks per frame that keys go to at most and at least.
+const LIGHTS_MAX: u32 = 1 << 14;
+const LIGHTS_MIN: u32 = 16;
+/// Degrees that the lamp goes around each frame, unless told otherwise.
+const TURN: f64 = 3.0;
+const VISIBILITIES: [Visibility; 3] = [Visibility::Rays, Visibility::Maps, Visibility::None];
+const BOUNDS: [Bound; 3] = [Bound::Geometry, Bound::Distance, Bound::None];
+/// Parts of the light, with what a title calls them.
+const PARTS: [(&str, &str); 3] = [
+    ("all light", "bounces=0..2,lobes=diffuse+glossy"),
+    ("light of lamps", "bounces=0..1,lobes=diffuse+glossy"),
+    ("light of virtual lights", "bounces=2,lobes=diffuse+glossy"),
+];
+
+fn main() -> ExitCode {
+    clerestory_samples::report(run())
+}
+
+fn run() -> Result<()> {
+    let own = ["--lights", "--visibility", "--bound", "--interleave", "--turn"];
+    let given = Arguments::of_process(&[&own[..], &window::Options::NAMES].concat(), 1)?;
+    let standard = ManyLightSettings::default();
+    let settings = ManyLightSettings::from_json(&serde_json::json!({
+        "lights": given.value("--lights")?.unwrap_or(LIGHTS),
+        "visibility": given.text("--visibility").unwrap_or("rays"),
+        "bound": given.text("--bound").unwrap_or("geometry"),
+        "interleave": given.value("--interleave")?.unwrap_or(standard.interleave),
+    }))?;
+    let turn: f64 = given.value("--turn")?.unwrap_or(TURN);
+    window::show(window::Options::of(&given, SCENE)?, |canvas| {
+        ManyLights::new(canvas, settings, turn.to_radians())
+    })
+}
+
+struct ManyLights {
+    gpu: Gpu,
+    scene: Arc<GpuScene>,
+    settings: ManyLightSettings,
+    /// Index into [`PARTS`].
+    part: usize,
+    exposure: f32,
+    format: PixelFormat,
+    lamp: Carousel,
+    /// Where the lamp is, and by how much it goes on; radians.
+    angle: f64,
+    turn: f64,
+    held: bool,
+    view: Option<View>,
+    /// Seconds of the frames that the title has not told of, and how many they are.
+    untold: (f64, u32),
+}
+
+/// A picture of the window's size.
+struct View {
+    renderer: ManyLight,
+    pixels: Buffer,
+    size: [u32; 2],
+    pose: Pose,
+    /// Samples per pixel.
+    samples: u32,
+}
+
+/// What follows an entry in a list, the first one after the last.
+fn next<T: Copy + PartialEq>(all: &[T], now: T) -> T {
+    let at = all
+        .iter()
+        .position(|one| *one == now)
+        .map_or(0, |at| (at + 1) % all.len());
+    all[at]
+}
+
+impl ManyLights {
+    fn new(canvas: &Canvas<'_>, settings: ManyLightSettings, turn: f64) -> Result<Self> {
+        let lamp = Carousel::new(canvas.scene)?;
+        let scene = GpuScene::new(canvas.gpu, canvas.scene)?;
+        let technique = techniques::by_id("many-light")?;
+        let reasons = (technique.refusals)(scene.profile());
+        if !reasons.is_empty() {
+            return Err(Error::Unsupported {
+                technique: technique.id.into(),
+                reasons,
+            });
+        }
+        scene.move_light(canvas.gpu, lamp.light(), &lamp.at(0.0))?;
+        Ok(Self {
+            gpu: canvas.gpu.clone(),
+            scene: Arc::new(scene),
+            settings,
+            part: 0,
+            exposure: canvas.exposure,
+            format: canvas.format,
+            lamp,
+            angle: 0.0,
+            turn,
+            held: false,
+            view: None,
+            untold: (0.0, 0),
+        })
+    }
+
+    /// A picture of another size, or with other settings.
+    fn open(&self, orbit: &Orbit, size: [u32; 2]) -> Result<View> {
+        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+        Ok(View {
+            renderer: ManyLight::new(
+                &self.gpu,
+                Arc::clone(&self.scene),
+                &orbit.camera(),
+                size,
+                self.settings.clone(),
+            )?,
+            pixels: self
+                .gpu
+                .buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
+            size,
+            pose: orbit.pose(),
+            samples: 0,
+        })
+    }
+
+    /// Moves the lamp, and lets the picture begin anew for what has moved.
+    fn go_on(&mut self, view: &mut View, orbit: &Orbit) -> Result<()> {
+        let lamp_moves = !self.held && self.turn != 0.0;
+        if lamp_moves {
+            self.angle = (self.angle + self.turn) % std::f64::consts::TAU;
+            self.scene
+                .move_light(&self.gpu, self.lamp.light(), &self.lamp.at(self.angle))?;
+        }
+        if view.pose != orbit.pose() {
+            view.renderer.set_camera(&orbit.camera())?;
+            (view.pose, view.samples) = (orbit.pose(), 0);
+        } else if lamp_moves {
+            // The same walks leave the lamp wherever it is, so that virtual lights move with it instead of flickering.
+            view.renderer.restart(self.settings.seed)?;
+            view.samples = 0;
+        }
+        Ok(())
+    }
+
+    /// Goes on to the next part of the light.
+    fn next_part(&mut self) {
+        let part = (self.part + 1) % PARTS.len();
+        if let Ok(path_set) = PARTS[part].1.parse::<PathSet>() {
+            (self.part, self.settings.path_set) = (part, path_set);
+        }
+    }
+}
+
+impl Show for ManyLights {
+    fn frame(&mut self, orbit: &mut Orbit, size: [u32; 2]) -> Result<Shown> {
+        let begin = Instant::now();
+        // The old picture goes before a new one is made, so that they need no memory at once.
+        let mut view = match self.view.take().filter(|view| view.size == size) {
+            Some(mut view) => {
+                self.go_on(&mut view, orbit)?;
+                view
+            }
+            None => self.open(orbit, size)?,
+        };
+        view.samples += 1;
+        while view.renderer.step(view.samples)?.is_some() {}
+        view.renderer.display(&view.pixels, self.exposure, self.format)?;
+        let pixels = view.pixels.clone();
+        self.view = Some(view);
+        let seconds = begin.elapsed().as_secs_f64();
+        self.untold = (self.untold.0 + seconds, self.untold.1 + 1);
+        Ok(Shown { pixels, seconds })
+    }
+
+    fn title(&mut self) -> String {
+        let (seconds, frames) = std::mem::take(&mut self.untold);
+        let s = &self.settings;
+        format!(
+            "{}: {} walks, visibility {:?}, bound {:?}, filter {}, {:.1} frames/s",
+            PARTS[self.part].0,
+            s.lights,
+            s.visibility,
+            s.bound,
+            if s.filter { "on" } else { "off" },
+            f64::from(frames) / seconds,
+        )
+    }
+
+    fn key(&mut self, key: &Key) {
+        let s = &mut self.settings;
+        match key {
+            Key::Named(NamedKey::Space) => {
+                self.held = !self.held;
+                return;
+            }
+            Key::Character(text) => match text.to_lowercase().as_str() {
+                "v" => s.visibility = next(&VISIBILITIES, s.visibility),
+                "b" => s.bound = next(&BOUNDS, s.bound),
+                "+" | "=" => s.lights = (2 * s.lights).min(LIGHTS_MAX),
+                "-" => s.lights = (s.lights / 2).max(LIGHTS_MIN),
+                "f" => s.filter = !s.filter,
+                "p" => self.next_part(),
+                _ => return,
+            },
+            _ => return,
+        }
+        self.view = None;
+    }
+
+    fn end(&mut self) {
+        println!("last: {}", self.title());
+    }
+}
