@@ -134,3 +134,14 @@ fn materials_of_all_kinds_agree_with_the_path_tracer() {
         expect_agreement(gpu, &panes, SAMPLES, 4096);
     });
 }
+
+/// Light is absorbed on all ways through a body, also on the first one of a light that is inside.
+#[test]
+fn bodies_that_absorb_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = room();
+        scene.name = "tinted body".into();
+        add_lit_body(&mut scene, 2.0);
+        expect_agreement(gpu, &scene, SAMPLES, 4096);
+    });
+}

@@ -13,7 +13,7 @@ use clerestory::gpu::Gpu;
 use clerestory::scene::{LightKind, Material, Scene};
 use clerestory::techniques::bidirectional::{BidirectionalPaths, BidirectionalSettings, Strategies};
 use clerestory::transport::random::SamplerKind;
-use clerestory_tests::render::{Rendered, advance, builtin, cuboid, lamp, mean, paths, render, upload};
+use clerestory_tests::render::{Rendered, add_lit_body, advance, builtin, cuboid, lamp, mean, paths, render, upload};
 use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::{DAffine3, DVec3, Vec3};

@@ -155,6 +155,7 @@ const ROWS: &[Row] = &[
             "tests/tests/bidirectional/agreement.rs::lamps_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::lights_without_area_and_skies_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/agreement.rs::bodies_that_absorb_agree_with_the_path_tracer",
             "tests/tests/bidirectional/edge_cases.rs::pictures_do_not_depend_on_how_the_work_is_cut_up",
             "tests/tests/bidirectional/edge_cases.rs::scenes_without_lights_or_reflection_have_nothing_to_join",
             "tests/tests/bidirectional/edge_cases.rs::what_cannot_be_modelled_is_refused_by_name",

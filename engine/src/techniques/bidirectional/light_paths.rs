@@ -19,6 +19,7 @@ use crate::gpu::{
     Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
 };
 use crate::scene::camera_frame::CameraFrame;
+use crate::transport::surface_spec::emission_spec;
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds, slots_of_device,
@@ -107,21 +108,10 @@ impl LightPaths {
         size: [u32; 2],
         settings: &BidirectionalSettings,
     ) -> Result<Self> {
-        let profile = scene.profile();
-        let emit = bdpt_emit::Spec {
-            has_textures: profile.has_textures,
-            has_vertex_colors: profile.has_vertex_colors,
-            has_shading_normals: false,
-            has_normal_maps: false,
-            has_unlit: false,
-            has_instances: profile.keeps_instances,
-            has_alpha: profile.has_alpha(),
-            has_environment: profile.has_environment(),
-            has_area_lights: scene.has_area_lights(),
-            has_punctual_lights: scene.has_punctual_lights(),
+        let emit = emission_spec!(bdpt_emit, scene, {
             sampler_kind: settings.sampler as u32,
             ..Default::default()
-        };
+        });
         let scatter = surface_spec!(bdpt_scatter, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
             separable_masking: false,
