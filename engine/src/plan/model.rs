@@ -418,6 +418,14 @@ impl PairCost {
         knows_best
     }
 
+    /// A pilot of `spp` samples per pixel took so many seconds for its last `samples`.
+    pub fn measure_run(&mut self, spp: u32, samples: u32, seconds: f64) {
+        if spp > self.by {
+            self.sample = seconds / f64::from(samples.max(1));
+            self.by = spp;
+        }
+    }
+
     /// Seconds that a pair of so many samples per pixel takes.
     pub fn seconds(&self, spp: u32) -> f64 {
         2.0 * (self.start + self.sample * f64::from(spp.saturating_sub(1)))
@@ -433,9 +441,56 @@ impl PairCost {
     }
 }
 
+/// Samples per pixel that a pilot took in one go, and their seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Run {
+    pub samples: u32,
+    pub seconds: f64,
+}
+
+/// Share of a run's time beyond which it says too little of what a sample costs.
+const FIXED_SHARE: f64 = 0.25;
+
+/// Whether a run has taken more than a quarter of its time by itself, however few samples it had, as the shorter one before says: passes over few paths take the time
+/// of passes.
+pub fn is_mostly_passes(before: Run, run: Run) -> bool {
+    if run.samples <= before.samples {
+        return false;
+    }
+    let sample = (run.seconds - before.seconds).max(0.0) / f64::from(run.samples - before.samples);
+    run.seconds - sample * f64::from(run.samples) > FIXED_SHARE * run.seconds
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn runs_of_few_samples_are_told_from_those_that_say_what_a_sample_costs() {
+        let run = |fixed: f64, samples: u32| Run {
+            samples,
+            seconds: fixed + 2.0 * f64::from(samples),
+        };
+        // 25 of 31, 25 of 49, and 25 of 121.
+        let mostly = [[1, 3], [3, 12], [12, 48]].map(|[a, b]| is_mostly_passes(run(25.0, a), run(25.0, b)));
+        assert_eq!(mostly, [true, true, false]);
+        assert!(!is_mostly_passes(run(0.0, 1), run(0.0, 3)));
+        // By chance a longer run may be the faster one.
+        let faster = Run {
+            samples: 3,
+            seconds: 20.0,
+        };
+        assert!(is_mostly_passes(run(25.0, 1), faster));
+        assert!(!is_mostly_passes(run(25.0, 3), run(25.0, 3)));
+        let mut cost = PairCost::default();
+        assert!(cost.measure(4, 6.0 * 10.0));
+        cost.measure_run(16, 12, 24.0);
+        assert_eq!(cost.sample, 2.0);
+        // Shorter ones know less.
+        cost.measure_run(16, 12, 36.0);
+        assert!(!cost.measure(8, 700.0) && cost.sample == 2.0);
+        assert!(cost.measure(17, 96.0) && cost.sample == 3.0);
+    }
 
     // A last pair of more samples than rounds had makes no sample dearer.
     #[test]

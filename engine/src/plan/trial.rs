@@ -7,7 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 use super::judgement::Judgement;
-use super::model::{CostModel, ErrorModel, PairCost};
+use super::model::{CostModel, ErrorModel, PairCost, Run, is_mostly_passes};
 use super::noise::{Pair, Truth, noise_of_pairs};
 use super::paths::same_picture;
 use super::{Candidate, Goal, Reference};
@@ -31,6 +31,8 @@ const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
 const PATIENCE: Duration = Duration::from_millis(500);
 /// The same of the pilots behind the first one, where the stop request was there before any of them: the least that a choice takes is then done.
 const LEAST_PATIENCE: Duration = Duration::from_secs(10);
+/// Seconds that a run for the cost of a sample alone may take at most, as the run before it lets expect.
+const COST_SECONDS: f64 = 0.25;
 /// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
 const SMALL: u32 = 4;
 /// Distance of the pilots' seeds from the picture's and from each other.
@@ -77,6 +79,8 @@ pub struct Trial<'a> {
     fixed: f64,
     /// What its own pairs cost.
     pub pairs: PairCost,
+    /// Seconds of a picture of the first round, without its first sample.
+    first_round: f64,
     /// Seconds of all pairs, with their beginnings.
     pub all_seconds: f64,
 }
@@ -185,6 +189,7 @@ impl<'a> Trial<'a> {
             cost: CostModel::default(),
             fixed: 0.0,
             pairs: PairCost::default(),
+            first_round: 0.0,
             all_seconds: 0.0,
         };
         let gave_up = |which: &str| {
@@ -232,8 +237,7 @@ impl<'a> Trial<'a> {
         }
         if let Some(small_seconds) = small_seconds {
             let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-            let seconds = trial.pairs.sample * f64::from(ROUNDS[0] - 1);
-            trial.fixed = fixed_share([area(small), small_seconds], [area(size), seconds]);
+            trial.fixed = fixed_share([area(small), small_seconds], [area(size), trial.first_round]);
             trial.cost.sample = trial.seconds_a_sample(asked.pixels());
         }
         Ok(Some(trial))
@@ -261,32 +265,69 @@ impl<'a> Trial<'a> {
     /// sample costs.
     fn pair(&mut self, asked: &Asked<'_>, spp: u32, pair: u32) -> Result<Option<[Picture; 2]>> {
         let from = Instant::now();
-        let mut seconds = 0.0;
-        let mut picture = |which: u32| -> Result<Option<Picture>> {
+        let [mut first_seconds, mut seconds] = [0.0; 2];
+        let mut picture = |which: u32| -> Result<Option<(Picture, Rendering)>> {
             let mut pilot = self.begin_pilot(asked, self.size, [pair, which])?;
+            let begun = Instant::now();
             if !run(&mut pilot, asked)? {
                 return Ok(None);
             }
-            let begun = Instant::now();
+            let first = begun.elapsed().as_secs_f64();
             pilot.set_spp(spp);
             if !run(&mut pilot, asked)? {
                 return Ok(None);
             }
-            seconds += begun.elapsed().as_secs_f64();
-            pilot.picture().map(Some)
+            first_seconds += first;
+            seconds += begun.elapsed().as_secs_f64() - first;
+            Ok(Some((pilot.picture()?, pilot)))
         };
-        let Some(one) = picture(0)? else {
+        let Some((one, _)) = picture(0)? else {
             return Ok(None);
         };
-        let Some(other) = picture(1)? else {
+        let Some((other, pilot)) = picture(1)? else {
             return Ok(None);
         };
         let pictures = [one, other];
+        let knows_best = self.pairs.measure(spp, seconds);
+        if spp == ROUNDS[0] {
+            self.first_round = 0.5 * seconds;
+            let of_one = |samples: u32, seconds: f64| Run {
+                samples,
+                seconds: 0.5 * seconds,
+            };
+            self.measure_cost(asked, pilot, [of_one(1, first_seconds), of_one(spp - 1, seconds)])?;
+        }
         self.all_seconds += from.elapsed().as_secs_f64();
-        if self.pairs.measure(spp, seconds) {
+        if knows_best {
             self.cost.sample = self.seconds_a_sample(asked.pixels());
         }
         Ok(Some(pictures))
+    }
+
+    /// Lets a pilot of the first round go on, whose runs were these, until a run's time is for the most part that of its samples: few samples of few pixels take the time
+    /// of passes.
+    fn measure_cost(
+        &mut self,
+        asked: &Asked<'_>,
+        mut pilot: Rendering,
+        [mut before, mut last]: [Run; 2],
+    ) -> Result<()> {
+        for [spp, next] in ROUNDS.array_windows() {
+            let samples = next - spp;
+            let expected = last.seconds * f64::from(samples) / f64::from(last.samples);
+            if !is_mostly_passes(before, last) || expected > COST_SECONDS {
+                break;
+            }
+            pilot.set_spp(*next);
+            let begun = Instant::now();
+            if !run(&mut pilot, asked)? {
+                break;
+            }
+            let seconds = begun.elapsed().as_secs_f64();
+            (before, last) = (last, Run { samples, seconds });
+            self.pairs.measure_run(*next, samples, seconds);
+        }
+        Ok(())
     }
 
     /// A further round of two pictures of `spp` samples per pixel; what keeps them from it is [`failure`](Self::failure) from then on. One that is given up changes
