@@ -148,6 +148,7 @@ const ROWS: &[Row] = &[
         ],
         shaders: &[
             "shaders/techniques/bidirectional/",
+            "shaders/transport/emission.glsl",
             "shaders/techniques/path/path_camera.comp",
             "shaders/techniques/path/path_resolve.comp",
             "shaders/walk/",

@@ -19,8 +19,7 @@ use crate::gpu::{
     Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
 };
 use crate::scene::camera_frame::CameraFrame;
-use crate::transport::surface_spec::emission_spec;
-use crate::transport::{GpuScene, surface_spec};
+use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds, slots_of_device,
     stage_barrier,
