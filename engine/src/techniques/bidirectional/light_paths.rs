@@ -446,7 +446,9 @@ impl WalkStages for LightStages<'_> {
     fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let walks = self.walks;
         recorder.pass("light subpaths: append", |pass| {
-            let push = bdpt_append::Push { capacity: walks.capacity };
+            let push = bdpt_append::Push {
+                capacity: walks.capacity,
+            };
             let own = walks.set();
             pass.dispatch_indirect(&walks.append, &[&bounce.wave, &own], &push, bounce.places.waiting)?;
             stage_barrier(pass);
