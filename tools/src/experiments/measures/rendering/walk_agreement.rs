@@ -169,7 +169,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>>
     let (side, repeats, of_reference) = context.pick(WORK[0], WORK[1]);
     let budgets = context.pick(BUDGETS[0], BUDGETS[1]);
     let renderer = Renderer::new(gpu, &scene::load(address)?)?;
-    let picture = |technique: &str, settings: &Settings, spp: u32, seed: u32| {
+    let picture = |technique: &str, settings: &Settings, spp: u32, seed: u32| -> Result<Option<Picture>> {
         let options = RenderOptions {
             technique: Some(technique.into()),
             size: [side; 2],
@@ -183,7 +183,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>>
     };
     let mut references = Vec::new();
     for paths in PATHS {
-        let settings = json!({ "sampler": "pcg", "path_set": paths }).into();
+        let settings: Settings = json!({ "sampler": "pcg", "path_set": paths }).into();
         let Some(reference) = picture("path", &settings, of_reference, SEED)? else {
             return Ok(Vec::new());
         };
