@@ -4,7 +4,7 @@
 //! Every scene is exported, rendered by `tools/mitsuba/reference.py` in independent passes, rendered here with independent (PCG) samples and
 //! Mitsuba's rough surfaces (single scattering, separable masking), in media with an integrator of Mitsuba's that has no bias, and compared
 //! by [`film::z_test`]: value by value and by blocks of 8 × 8 pixels, whose means show eight times smaller differences (the worse of both
-//! verdicts counts), and as a whole. In the same run both renderers take turns at pictures with each of their samplers, and are compared by time to equal error: [`Race`].
+//! verdicts counts), and as a whole. Then, scene by scene again, both renderers take turns at pictures with each of their samplers, and are compared by time to equal error: [`Race`].
 //! Guarantees: pictures and errors depend on the options and the drivers alone; times are wall-clock and processor seconds, medians.
 //!
 //! [`mitsuba::scenes`]: crate::mitsuba::scenes
@@ -23,6 +23,7 @@ use std::sync::Arc;
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE};
 use clerestory::film::{CompareOptions, Picture, ToneMap, compare, exr, png, z_test};
 use clerestory::gpu::Gpu;
+use clerestory::scene::Camera;
 use clerestory::techniques::path::Adaptive;
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::GpuScene;
@@ -30,11 +31,11 @@ use clerestory::transport::random::SamplerKind;
 use clerestory::{Error, Result};
 
 use crate::experiments::watch::Watch;
-use crate::mitsuba::export;
 use crate::mitsuba::scenes::{ComparedScene, scenes};
+use crate::mitsuba::{Exported, export};
 pub use chosen::Chosen;
 pub use peer::mitsuba_version;
-use peer::{Integrator, Peer, Request, Variant};
+use peer::{Integrator, Peer, Rendered, Request, Variant};
 use race::RaceSetup;
 pub use race::{Contender, EqualError, Lead, Race};
 pub(crate) use report::BIAS_Z_MAX;
@@ -132,9 +133,9 @@ impl Fault {
     }
 }
 
-/// Compares all wanted scenes of a report that was begun, on a device, until `watch` says to stop, and gives `keep` the report after each. The scenes
-/// that it holds stay in it; without a selection only the others are compared. A scene of which Mitsuba makes a picture that is not finite is noted
-/// and left out.
+/// Compares all wanted scenes of a report that was begun, on a device, then races them, until `watch` says to stop, and gives `keep` the report after each.
+/// The scenes that it holds stay in it, and so do their races; without a selection only the others are compared. A scene of which Mitsuba makes a picture that is
+/// not finite is noted and left out.
 ///
 /// # Errors
 /// [`Error::Setting`] for options out of range, an unknown scene, or a Python that cannot be run or has no Mitsuba; those of the device, the
@@ -150,21 +151,17 @@ pub fn run_with(
     let wanted = selected(options)?;
     let order: Vec<&str> = scenes()?.iter().map(|one| one.name).collect();
     let place = |name: &str| order.iter().position(|known| *known == name);
-    for (done, one) in wanted.iter().enumerate() {
-        if watch.stopped() {
-            break;
-        }
-        if options.scenes.is_empty() && report.scenes.iter().any(|kept| kept.name == one.name) {
-            continue;
-        }
-        watch.begin(&format!("{}: {}", one.name, one.shows), done, wanted.len());
-        let scene = match compare_scene(gpu, one, options, watch) {
-            Ok(scene) => Ok(scene),
+    let is_kept = |report: &AgreementReport, one: &ComparedScene| {
+        options.scenes.is_empty() && report.scenes.iter().any(|kept| kept.name == one.name)
+    };
+    let compared: Vec<&ComparedScene> = wanted.iter().filter(|one| !is_kept(&report, one)).collect();
+    for (done, one) in compared.iter().enumerate() {
+        watch.begin(&format!("{}: {}", one.name, one.shows), done, compared.len());
+        let scene = match unless_stopped(compare_scene(gpu, one, options, watch), watch) {
+            Ok(Some(scene)) => Ok(scene),
+            Ok(None) => return Ok(report),
             Err(Fault::NotFinite(cause)) => Err(cause),
-            Err(Fault::Stopped) => break,
-            // A stop request may reach what works here by other ways too.
-            Err(Fault::Other(_)) if watch.stopped() => break,
-            Err(Fault::Other(error)) => return Err(error),
+            Err(fault) => return Err(fault.into_error(one.name)),
         };
         watch.note(&format!("{}: {}", one.name, one.shows));
         report.scenes.retain(|kept| kept.name != one.name);
@@ -183,7 +180,37 @@ pub fn run_with(
         // After every scene, so that a run that is cut short leaves what it has found.
         keep(&report)?;
     }
+    if options.timing_rounds == 0 {
+        return Ok(report);
+    }
+    // One after the other, so that all races are run by a machine in the same state.
+    let is_raced = |scene: &SceneAgreement| scene.race.is_some() && !compared.iter().any(|one| one.name == scene.name);
+    let raced: Vec<usize> = (0..report.scenes.len())
+        .filter(|index| !is_raced(&report.scenes[*index]))
+        .collect();
+    for (done, index) in raced.iter().enumerate() {
+        let scene = &report.scenes[*index];
+        let Some(one) = wanted.iter().find(|one| one.name == scene.name) else {
+            continue;
+        };
+        watch.begin(&format!("{}: race", one.name), done, raced.len());
+        match unless_stopped(race_scene(gpu, one, scene, options, watch), watch) {
+            Ok(Some((race, chosen))) => (report.scenes[*index].race, report.scenes[*index].chosen) = (race, chosen),
+            Ok(None) => return Ok(report),
+            Err(fault) => return Err(fault.into_error(one.name)),
+        }
+        keep(&report)?;
+    }
     Ok(report)
+}
+
+/// `None` where somebody asked to stop: what fails after a stop request may have been reached by it.
+fn unless_stopped<T>(result: Result<T, Fault>, watch: &dyn Watch) -> Result<Option<T>, Fault> {
+    match result {
+        Err(Fault::Stopped) => Ok(None),
+        Err(Fault::Other(_)) if watch.stopped() => Ok(None),
+        result => result.map(Some),
+    }
 }
 
 impl AgreementOptions {
@@ -283,29 +310,10 @@ fn compare_scene(
     watch: &dyn Watch,
 ) -> Result<SceneAgreement, Fault> {
     let folder = options.output.join(one.name);
-    let size = [options.size; 2];
-    let exported = export(&one.scene, "", size, &folder)?;
-    let peer = Peer::new(options, &folder)?;
-    let request = Request {
-        scene: &exported.scene,
-        name: "mitsuba",
-        variant: Variant::Auto,
-        sampler: "independent",
-        integrator: Integrator::of_reference(&one.scene),
-        passes: options.passes,
-        samples: options.samples_per_pass,
-        seed: options.seed,
-        each: false,
-    };
-    let theirs = peer.render(&request, watch)?;
-
+    let exported = export(&one.scene, "", [options.size; 2], &folder)?;
+    let theirs = converged(one, &exported, &Peer::new(options, &folder)?, options, watch)?;
     let scene = Arc::new(GpuScene::new(gpu, &one.scene)?);
-    let camera = one.scene.camera(None).ok_or_else(|| Error::Setting {
-        name: "camera".into(),
-        value: one.name.into(),
-        cause: "has none".into(),
-    })?;
-    let mut tracer = PathTracer::new(gpu, scene.clone(), camera, size, settings(options))?;
+    let mut tracer = PathTracer::new(gpu, scene, camera(one)?, [options.size; 2], settings(options))?;
     tracer.render(options.passes * options.samples_per_pass)?;
     let (ours, non_finite) = tracer.picture()?;
     drop(tracer);
@@ -322,31 +330,6 @@ fn compare_scene(
         [(a, 1), (a_var, 2), (b, 1), (b_var, 2)].map(|(values, power)| block_means(values, options.size, power));
     let blocks = z_test(&a_block, &a_block_var, &b_block, &b_block_var, SIGNIFICANCE)?;
     let errors = compare(&ours, &reference, &CompareOptions::default())?;
-
-    let (mut race, mut chosen) = (None, None);
-    if options.timing_rounds > 0 {
-        let has_llvm = theirs.variant == Variant::Llvm.name();
-        if !has_llvm {
-            watch.note(&format!(
-                "{}: Mitsuba's LLVM variant not measured, none found",
-                one.name
-            ));
-        }
-        let setup = RaceSetup {
-            gpu,
-            scene,
-            camera,
-            contenders: Integrator::contenders(&one.scene),
-            peer: &peer,
-            exported: &exported.scene,
-            has_llvm,
-            reference: b,
-        };
-        race = race::run(&setup, options, watch)?;
-        if let Some(race) = &race {
-            chosen = chosen::run(gpu, &one.scene, race, &reference, options, watch)?;
-        }
-    }
     Ok(SceneAgreement {
         name: one.name.into(),
         shows: one.shows.into(),
@@ -359,9 +342,84 @@ fn compare_scene(
         values,
         blocks,
         non_finite: non_finite.total(),
-        race,
-        chosen,
+        race: None,
+        chosen: None,
     })
+}
+
+/// Name of Mitsuba's converged picture in a scene's folder.
+const CONVERGED: &str = "mitsuba";
+
+/// Mitsuba's converged picture.
+fn converged(
+    one: &ComparedScene,
+    exported: &Exported,
+    peer: &Peer,
+    options: &AgreementOptions,
+    watch: &dyn Watch,
+) -> Result<Rendered, Fault> {
+    let request = Request {
+        scene: &exported.scene,
+        name: CONVERGED,
+        variant: Variant::Auto,
+        sampler: "independent",
+        integrator: Integrator::of_reference(&one.scene),
+        passes: options.passes,
+        samples: options.samples_per_pass,
+        seed: options.seed,
+        each: false,
+    };
+    peer.render(&request, watch)
+}
+
+fn camera(one: &ComparedScene) -> Result<&Camera> {
+    one.scene.camera(None).ok_or_else(|| Error::Setting {
+        name: "camera".into(),
+        value: one.name.into(),
+        cause: "has none".into(),
+    })
+}
+
+/// Both renderers' times to equal error on a scene that was compared, and that of the technique that is chosen for our error.
+fn race_scene(
+    gpu: &Gpu,
+    one: &ComparedScene,
+    compared: &SceneAgreement,
+    options: &AgreementOptions,
+    watch: &dyn Watch,
+) -> Result<(Option<Race>, Option<Chosen>), Fault> {
+    let folder = options.output.join(one.name);
+    let exported = export(&one.scene, "", [options.size; 2], &folder)?;
+    let peer = Peer::new(options, &folder)?;
+    // A scene that was kept from an earlier run may have lost its picture since.
+    let picture = folder.join(CONVERGED).with_extension("exr");
+    if !picture.exists() {
+        converged(one, &exported, &peer, options, watch)?;
+    }
+    let reference = exr::read(&picture)?;
+    let has_llvm = compared.variant == Variant::Llvm.name();
+    if !has_llvm {
+        watch.note(&format!(
+            "{}: Mitsuba's LLVM variant not measured, none found",
+            one.name
+        ));
+    }
+    let setup = RaceSetup {
+        gpu,
+        scene: Arc::new(GpuScene::new(gpu, &one.scene)?),
+        camera: camera(one)?,
+        contenders: Integrator::contenders(&one.scene),
+        peer: &peer,
+        exported: &exported.scene,
+        has_llvm,
+        reference: reference.main_layer()?.values(),
+    };
+    let race = race::run(&setup, options, watch)?;
+    let chosen = match &race {
+        Some(race) => chosen::run(gpu, &one.scene, race, &reference, options, watch)?,
+        None => None,
+    };
+    Ok((race, chosen))
 }
 
 /// Both pictures as EXR and PNG, and their difference in units of its standard deviation.

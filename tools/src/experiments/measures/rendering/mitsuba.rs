@@ -60,6 +60,8 @@ rows! {
         scalar: Option<f64> = "ratio to its scalar variant",
         samples: Option<f64> = "relative MSE over that of its best sampler at equal samples",
         samples_error: Option<f64> = "standard error of that",
+        rate: Option<f64> = "paths per second over those of its best",
+        bounded: Option<String> = "bounded by",
         chosen: Option<String> = "technique chosen for the error",
         chosen_seconds: Option<f64> = "its picture's time (s)",
         pilots: Option<f64> = "its pilots' time (s)",
@@ -129,8 +131,12 @@ const OF_TIMES: &[Criterion<Time>] = &[
     Criterion::all(
         "beside Mitsuba's best with the technique chosen for the error, without its pilots, geometric mean of the ratios",
         Bound::AtLeast(1.0),
-        |rows: &[&Time]| geometric_mean(rows.iter().map(|row| row.chosen_ratio.unwrap_or(f64::NAN).into())),
+        |rows: &[&Time]| {
+            let told = rows.iter().filter(|row| !row.is_lost_in_noise());
+            geometric_mean(told.map(|row| row.chosen_ratio.unwrap_or(f64::NAN).into()))
+        },
     )
+    .because("scenes are left out where the error of the chosen picture is lost in the noise of Mitsuba's converged one")
     .needs(MITSUBA),
     Criterion::all(
         "beside Mitsuba's scalar variant, geometric mean of the ratios",
@@ -189,7 +195,23 @@ fn degrees_of_freedom(variances: &[(f64, f64)]) -> f64 {
     sum * sum / squares
 }
 
+/// What makes a race lost, by the rate of paths and the relative MSE at equal samples, both over Mitsuba's.
+fn bounded_by(rate: f64, error: f64) -> &'static str {
+    match (rate < 1.0, error > 1.0) {
+        (false, false) => "nothing",
+        (true, true) if rate * error > 1.0 => "error at equal samples, then paths per second",
+        (true, true) => "paths per second, then error at equal samples",
+        (true, false) => "paths per second",
+        (false, true) => "error at equal samples",
+    }
+}
+
 impl Time {
+    /// Whether it was raced, and the chosen technique's error could not be told.
+    fn is_lost_in_noise(&self) -> bool {
+        self.unraced.is_none() && self.chosen_ratio.is_none()
+    }
+
     /// The ratio with its interval, by its logarithm; no number without a race.
     fn ratio(&self) -> Measured {
         let ratio = self.ratio.unwrap_or(f64::NAN);
@@ -213,6 +235,7 @@ impl Time {
         let best = &race.against_best;
         let [ours, theirs] = race.pair(best);
         let [samples, samples_error] = race.error_at_equal_samples();
+        let rate = ours.paths_per_second / theirs.paths_per_second;
         let chosen = scene.chosen.as_ref();
         // Seconds vary from round to round, or from picture to picture where there is one round.
         let timed = match options.timing_rounds {
@@ -241,6 +264,8 @@ impl Time {
             scalar: finite(race.against_scalar.ratio),
             samples: finite(samples),
             samples_error: finite(samples_error),
+            rate: finite(rate),
+            bounded: Some(bounded_by(rate, ours.relative_mse / theirs.relative_mse).into()),
             chosen: chosen.map(|one| match &*one.variant {
                 "" => one.technique.clone(),
                 variant => format!("{} ({variant})", one.technique),
@@ -351,8 +376,8 @@ impl Study for Found {
     }
 }
 
-/// Compares scene by scene. Scenes take minutes each, and are kept as soon as they are there, so that a run that was stopped goes on; smoke runs keep
-/// nothing.
+/// Compares and races scene by scene. Scenes take minutes each, and are kept as soon as they are there, first without their race, so that a run that was stopped
+/// goes on; smoke runs keep nothing.
 fn compared(context: &Context<'_>, options: &AgreementOptions) -> Result<AgreementReport> {
     let gpu = (context.gpu)()?;
     let mut report = AgreementReport::begin(&gpu, options)?;
@@ -363,21 +388,31 @@ fn compared(context: &Context<'_>, options: &AgreementOptions) -> Result<Agreeme
     let mut kept = KeptRows::open(context.folder, &device, &report.machine.mitsuba)?;
     let names: Vec<&str> = scenes()?.iter().map(|scene| scene.name).collect();
     for (place, name) in names.iter().enumerate() {
+        let known = [true, false].map(|raced| kept.get::<SceneAgreement>(place, &case(name, raced)));
         report
             .scenes
-            .extend(kept.get::<SceneAgreement>(place, name).unwrap_or_default());
+            .extend(known.into_iter().flatten().next().unwrap_or_default());
     }
-    let mut known: Vec<String> = report.scenes.iter().map(|scene| scene.name.clone()).collect();
+    let state = |scene: &SceneAgreement| (scene.name.clone(), scene.race.is_some());
+    let mut known: Vec<(String, bool)> = report.scenes.iter().map(state).collect();
     run_with(&gpu, report, context.watch, &mut |report| {
         for (place, name) in names.iter().enumerate() {
-            let fresh = report.scenes.iter().find(|scene| scene.name == *name);
-            if let Some(scene) = fresh.filter(|_| !known.iter().any(|one| one == name)) {
-                kept.add(place, name, std::slice::from_ref(scene))?;
-                known.push(scene.name.clone());
+            let scene = report.scenes.iter().find(|scene| scene.name == *name);
+            if let Some(scene) = scene.filter(|scene| !known.contains(&state(scene))) {
+                kept.add(place, &case(name, scene.race.is_some()), std::slice::from_ref(scene))?;
+                known.push(state(scene));
             }
         }
         Ok(())
     })
+}
+
+/// What a scene's row is kept as, before and after its race.
+fn case(scene: &str, raced: bool) -> String {
+    match raced {
+        true => format!("{scene}, raced"),
+        false => scene.into(),
+    }
 }
 
 fn options(context: &Context<'_>) -> AgreementOptions {
@@ -537,6 +572,40 @@ mod tests {
         };
         let first = &Found::of(&refused).findings().verdicts[0];
         assert_eq!((first.failing, first.worst.as_str()), (1, "refused"));
+    }
+
+    #[test]
+    fn races_are_lost_by_paths_per_second_or_by_errors() {
+        let of =
+            [(0.5, 0.8), (1.5, 1.2), (0.5, 1.5), (0.9, 2.0), (1.2, 0.9)].map(|(rate, error)| bounded_by(rate, error));
+        assert_eq!(
+            of,
+            [
+                "paths per second",
+                "error at equal samples",
+                "paths per second, then error at equal samples",
+                "error at equal samples, then paths per second",
+                "nothing",
+            ]
+        );
+    }
+
+    #[test]
+    fn chosen_pictures_without_a_known_error_are_left_out() {
+        let report = made_up();
+        let mut scenes = vec![report.scenes[0].clone(); 2];
+        scenes[0].chosen = Some(made_up_chosen());
+        let judged = |scenes: &[SceneAgreement]| {
+            let report = AgreementReport {
+                scenes: scenes.to_vec(),
+                ..report.clone()
+            };
+            Found::of(&report).findings().verdicts[6].found.map(|found| found.value)
+        };
+        assert_eq!(judged(&scenes), Some(1.2));
+        // A scene without a race is not one without noise.
+        scenes.push(report.scenes[1].clone());
+        assert!(judged(&scenes).unwrap().is_nan());
     }
 
     #[test]
