@@ -451,14 +451,15 @@ pub struct Run {
 /// Share of a run's time beyond which it says too little of what a sample costs.
 const FIXED_SHARE: f64 = 0.25;
 
-/// Whether a run has taken more than a quarter of its time by itself, however few samples it had, as the shorter one before says: passes over few paths take the time
-/// of passes.
-pub fn is_mostly_passes(before: Run, run: Run) -> bool {
-    if run.samples <= before.samples {
-        return false;
+/// Seconds that a run of so many samples is expected to take, by the last one and a shorter one before, where the last one has taken more than a quarter of its time by
+/// itself, however few samples it had: passes over few paths take the time of passes. `None` where it says what a sample costs.
+pub fn longer_run(before: Run, last: Run, samples: u32) -> Option<f64> {
+    if last.samples <= before.samples {
+        return None;
     }
-    let sample = (run.seconds - before.seconds).max(0.0) / f64::from(run.samples - before.samples);
-    run.seconds - sample * f64::from(run.samples) > FIXED_SHARE * run.seconds
+    let sample = (last.seconds - before.seconds).max(0.0) / f64::from(last.samples - before.samples);
+    let fixed = last.seconds - sample * f64::from(last.samples);
+    (fixed > FIXED_SHARE * last.seconds).then(|| fixed + sample * f64::from(samples))
 }
 
 #[cfg(test)]
@@ -472,16 +473,17 @@ mod tests {
             seconds: fixed + 2.0 * f64::from(samples),
         };
         // 25 of 31, 25 of 49, and 25 of 121.
-        let mostly = [[1, 3], [3, 12], [12, 48]].map(|[a, b]| is_mostly_passes(run(25.0, a), run(25.0, b)));
-        assert_eq!(mostly, [true, true, false]);
-        assert!(!is_mostly_passes(run(0.0, 1), run(0.0, 3)));
+        let longer =
+            [[1, 3, 12], [3, 12, 48], [12, 48, 192]].map(|[a, b, c]| longer_run(run(25.0, a), run(25.0, b), c));
+        assert_eq!(longer, [Some(49.0), Some(121.0), None]);
+        assert_eq!(longer_run(run(0.0, 1), run(0.0, 3), 12), None);
         // By chance a longer run may be the faster one.
         let faster = Run {
             samples: 3,
             seconds: 20.0,
         };
-        assert!(is_mostly_passes(run(25.0, 1), faster));
-        assert!(!is_mostly_passes(run(25.0, 3), run(25.0, 3)));
+        assert_eq!(longer_run(run(25.0, 1), faster, 12), Some(20.0));
+        assert_eq!(longer_run(run(25.0, 3), run(25.0, 3), 12), None);
         let mut cost = PairCost::default();
         assert!(cost.measure(4, 6.0 * 10.0));
         cost.measure_run(16, 12, 24.0);

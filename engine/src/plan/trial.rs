@@ -7,7 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 use super::judgement::Judgement;
-use super::model::{CostModel, ErrorModel, PairCost, Run, is_mostly_passes};
+use super::model::{CostModel, ErrorModel, PairCost, Run, longer_run};
 use super::noise::{Pair, Truth, noise_of_pairs};
 use super::paths::same_picture;
 use super::{Candidate, Goal, Reference};
@@ -31,8 +31,10 @@ const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
 const PATIENCE: Duration = Duration::from_millis(500);
 /// The same of the pilots behind the first one, where the stop request was there before any of them: the least that a choice takes is then done.
 const LEAST_PATIENCE: Duration = Duration::from_secs(10);
-/// Seconds that a run for the cost of a sample alone may take at most, as the run before it lets expect.
-const COST_SECONDS: f64 = 0.25;
+/// Seconds that a run for the cost of a sample alone may take at most, as those before it let expect.
+const COST_SECONDS: f64 = 0.5;
+/// Seconds of a run below which the clock says too little of it.
+const SHORT_SECONDS: f64 = 0.05;
 /// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
 const SMALL: u32 = 4;
 /// Distance of the pilots' seeds from the picture's and from each other.
@@ -314,8 +316,9 @@ impl<'a> Trial<'a> {
     ) -> Result<()> {
         for [spp, next] in ROUNDS.array_windows() {
             let samples = next - spp;
-            let expected = last.seconds * f64::from(samples) / f64::from(last.samples);
-            if !is_mostly_passes(before, last) || expected > COST_SECONDS {
+            let goes_on = last.seconds < SHORT_SECONDS
+                || longer_run(before, last, samples).is_some_and(|expected| expected <= COST_SECONDS);
+            if !goes_on {
                 break;
             }
             pilot.set_spp(*next);
