@@ -25,8 +25,8 @@ use crate::experiments::watch::render;
 
 /// Rooms, halls and closed forms, with lamps, points, spots, suns and skies. None has light that a path from the eye cannot find.
 const SCENES: [&str; 12] = [
-    "builtin:cornell-box",
     SPHERE,
+    "builtin:cornell-box",
     "builtin:cornell-box?source=point",
     "builtin:cornell-box?source=spot",
     "builtin:cornell-box?sphere=gold&boxes=tall",
@@ -41,7 +41,7 @@ const SCENES: [&str; 12] = [
 /// Where no virtual light is nearer than another to what it lights, so that none needs a bound.
 const SPHERE: &str = "builtin:sphere-light?rho=0.5&frequency=12";
 /// Scenes of a smoke run.
-const FEW_SCENES: usize = 2;
+const FEW_SCENES: usize = 1;
 
 /// What virtual lights light, and what bidirectional paths do but for lamps in view, whose outlines are rare and bright in pixels that they barely touch.
 const PATHS: [&str; 2] = ["!L.*S[DG]S*E", "bounces=1.."];
