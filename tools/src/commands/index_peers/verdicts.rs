@@ -185,7 +185,7 @@ mod tests {
         let number = |i: usize| all[i].found.map(|found| found.value);
         // `materials` is not of the scenes of the first, the conference not of the two best of the second.
         assert_eq!([3, 4].map(number), [1.5, 1.0].map(Some));
-        assert!(matches!(all[3].verdict, Verdict::Fails { .. }));
+        assert_ne!(all[3].verdict, Verdict::Holds);
     }
 
     #[test]
