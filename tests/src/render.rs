@@ -29,10 +29,10 @@ pub fn camera_aslant() -> Camera {
 /// Places a rough body into a room that absorbs what goes through it, colour by colour, and a matte plate and a point light into the body.
 pub fn add_lit_body(scene: &mut Scene, intensity: f32) {
     let tinted = scene.add_material(Material {
-        roughness: 0.6,
+        roughness: 0.9,
         attenuation_color: Vec3::new(0.2, 0.5, 0.8),
         attenuation_distance: 0.3,
-        ..Material::glass("tinted", 1.3)
+        ..Material::glass("tinted", 1.5)
     });
     let matte = scene.add_material(Material::lambert("matte", Vec3::splat(0.8)));
     let corner = Vec3::new(-0.2, -0.9, -0.85);

@@ -173,6 +173,7 @@ fn bodies_that_absorb_agree_with_the_path_tracer() {
         let mut scene = room();
         scene.name = "tinted body".into();
         add_lit_body(&mut scene, 2.0);
-        expect_agreement(gpu, &scene, SAMPLES, 4096);
+        // Light that goes through the rough surface beside the lamp is rare and bright.
+        expect_agreement(gpu, &scene, 8 * SAMPLES, 16_384);
     });
 }

@@ -263,6 +263,7 @@ mod tests {
     fn glass(scene: &mut Scene, name: &str) -> u32 {
         scene.add_material(Material {
             attenuation_color: Vec3::splat(0.5),
+            attenuation_distance: 1.0,
             ..Material::glass(name, 1.5)
         })
     }

@@ -79,7 +79,7 @@ impl Keeping {
         let holds_lamp = |instance: &Instance| {
             let mesh = &scene.meshes[instance.mesh as usize];
             let material = mesh.material.map(|index| &scene.materials[index as usize]);
-            let absorbs = material.is_some_and(|m| bounds_body(m) && m.attenuation_color.min_element() < 1.0);
+            let absorbs = material.is_some_and(|m| bounds_body(m) && m.attenuation_distance.is_finite());
             absorbs && !lamps.is_empty() && {
                 let around = placed_box(mesh, instance);
                 lamps.iter().any(|lamp| boxes_meet(&around, lamp))

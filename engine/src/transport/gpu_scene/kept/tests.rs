@@ -141,6 +141,7 @@ fn bodies_that_absorb_are_flattened_where_a_light_may_be_inside() {
     scene.materials[1].emission = Vec3::ZERO;
     scene.materials[0] = Material {
         attenuation_color: Vec3::splat(0.5),
+        attenuation_distance: 1.0,
         ..Material::glass("tinted", 1.5)
     };
     let kept = |scene: &Scene| -> Vec<usize> {
