@@ -6,6 +6,7 @@
 #include "twin_interface.glsl"
 
 #include "techniques/photon_mapping/kernel.glsl"
+#include "techniques/photon_mapping/photon_event.glsl"
 
 Differentials in_differentials(uint i) { return Differentials(in3(i), in3(i + 3u), in3(i + 6u), in3(i + 9u)); }
 
@@ -98,6 +99,23 @@ void main() {
         q0.w |= in_bits(21u);
         out1(12u, photon_weight(in_bits(22u), q0, q1, q2, in3(18u), in3(23u), in1(26u)));
         out_bits(13u, photon_ends_leaf(q0) ? 1u : 0u);
+        break;
+    }
+    case 6u: {  // events in media
+        uvec4 q0;
+        uvec4 q1;
+        pack_event(PhotonEvent(in3(0u), in3(3u), in3(6u), in1(9u), in_bits(10u), in_bits(11u)), q0, q1);
+        out_bits(0u, q0.w);
+        out_bits(1u, q1.x);
+        q1.z |= in_bits(12u);
+        PhotonEvent e = unpack_event(q0, q1);
+        out3(2u, e.direction);
+        out3(5u, e.flux);
+        out1(8u, e.radius);
+        out_bits(9u, e.medium);
+        out_bits(10u, e.bounce);
+        out_bits(11u, event_ends_leaf(q1) ? 1u : 0u);
+        out1(12u, ball_profile(in_bits(13u), in1(14u)));
         break;
     }
     }

@@ -21,9 +21,6 @@ layout(constant_id = 43) const bool LINEAR = false;        // goes through recor
 layout(constant_id = 45) const bool NEAREST = false;       // one kernel about the point, up to its `neighbors`-th photon
 layout(constant_id = 46) const uint QUEUE = QUEUE_SLOTS;
 
-// Stand in walk_resume for a query that its quota stopped, and for a place that has none or is done.
-const uint GATHER_STOPPED = 0xFFFFFFFEu;
-const uint GATHER_DONE = 0xFFFFFFFCu;
 // Photons count where their surface's normal is less than 60 degrees from that of the point: not through thin walls nor around corners.
 const float PHOTON_NORMAL_COS_MIN = 0.5;
 
@@ -70,6 +67,8 @@ bool compact_visit_point(uint record);
 
 // Beside the other bindings of the map (photon_map.glsl): in memory, so that the device may have made it.
 layout(set = 1, binding = 3, scalar) restrict readonly buffer PhotonMapRoot { CompactRoot photon_map_root; };
+// In scenes with media alone; elsewhere some other buffer is bound, and nothing is read.
+layout(set = 1, binding = 4, scalar) restrict readonly buffer PhotonBeamWays { BeamWay beam_ways[]; };
 
 layout(push_constant, scalar) uniform Push {
     AskSettings ask;
@@ -186,7 +185,12 @@ bool begin_gather(uint slot, uint place, out vec3 throughput) {
         return false;
     }
     gather.bounce = asking_bounce(path);
-    if (HAS_ABSORPTION) {
+    if (HAS_MEDIA) {
+        throughput *= beam_ways[place].surface;
+        if (throughput == vec3(0.0)) {
+            return false;
+        }
+    } else if (HAS_ABSORPTION) {
         throughput = absorbed(throughput, arrival_interior(a, walk_gathered[slot].interior), a.distance);
     }
     gather.bsdf = a.bsdf;
@@ -219,19 +223,20 @@ void main() {
     if (QUEUE != QUEUE_SLOTS) {
         place = queued_place(QUEUE, place);
     }
-    if (!wave_has_arrived() || place >= status.active_count || (LINEAR && walk_resume[place] != GATHER_STOPPED)) {
+    if (!wave_has_arrived() || place >= status.active_count
+        || (LINEAR && !(HAS_MEDIA ? gather_has_stopped(walk_resume[place]) : walk_resume[place] == GATHER_STOPPED))) {
         return;
     }
+    uint resume = walk_resume[place];
     if (!LINEAR) {
-        uint resume = walk_resume[place];
-        if (resume == GATHER_STOPPED || resume == GATHER_DONE) {
+        if (HAS_MEDIA ? !beam_is_known(resume) : resume == GATHER_STOPPED || resume == GATHER_DONE) {
             return;
         }
         if (!has_work_left()) {
             leave_for_later(STALLED_ARRIVAL);
             return;
         }
-        walk_resume[place] = GATHER_DONE;
+        walk_resume[place] = HAS_MEDIA ? gather_done(resume) : GATHER_DONE;
     }
     uint slot = load_slot(place);
     vec3 throughput;
@@ -243,7 +248,7 @@ void main() {
         count_work(QUERY_STEP_WORK * compact_steps, QUERY_STEP_WORK * WORK_UNIT);
     }
     if (!complete) {
-        walk_resume[place] = GATHER_STOPPED;
+        walk_resume[place] = HAS_MEDIA ? gather_stopped(resume) : GATHER_STOPPED;
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_ARRIVAL);
         return;

@@ -1,8 +1,12 @@
-// What a record says of the photon's way, in bits that the words of kernel.glsl leave free.
+// What is known of a photon's way, and what its record says of it, in bits that the words of kernel.glsl leave free.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_HISTORY_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_HISTORY_GLSL
 
-// In the word of the normal: the photon has been scattered diffusely.
+// State of a photon's path, beside its number of bounces: whether it has been scattered diffusely, or in a medium.
+const uint PHOTON_UNDIFFUSED = 0u;
+const uint PHOTON_DIFFUSED = 1u;
+
+// In the word of the normal: the photon has been scattered diffusely, or in a medium.
 const uint PHOTON_DIFFUSED_BIT = 0x40000000u;
 // In the word of the direction: how often it has been scattered before it landed, at most PHOTON_BOUNCE_MAX.
 const uint PHOTON_BOUNCE_SHIFT = 26u;

@@ -6,6 +6,8 @@
 // leaves its largest band as it is. Scattering functions are those of power (BSDF_IMPORTANCE), and where normals are interpolated the ratio
 // of cosines makes up for it (Veach 1997, 5.3.2), except for what adapt_shading_normal bends.
 //
+// In scenes with media photon_medium.comp has gone before: it has handled those that did not come as far, and says what is left of the others.
+//
 // PM-PH-1, PM-PD-2 to PM-PD-7: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §3.4.1 and §5.1. Deterministic in (seed, pass, photon).
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -31,23 +33,12 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 #include "walk/draws.glsl"
+#include "techniques/photon_mapping/photon_flux.glsl"
+#include "walk/hand_on.glsl"
 #include "walk/survival.glsl"
 
 // Least axis of a kernel, in errors of its position: far from the origin positions lie on a grid, which a kernel must not fall through.
 const float KERNEL_RESOLUTION = 4.0;
-// Steps of a band in a record, over the power of two below the largest band (packing.glsl).
-const float FLUX_STEP_SHARE = 1.0 / 256.0;
-// Below this power of two steps are the same.
-const float FLUX_STEP_LEAST_POWER = 1.0 / 65536.0;
-
-// The flux with noise of a step of its record's bands, so that rounding errs by nothing on average: photons of one history share their flux.
-vec3 dithered_flux(vec3 flux, uint slot, uint bounce) {
-    uvec3 bits = pcg4d(uvec4(push.key.first_index + slot, bounce, push.key.first_sequence, push.key.seed)).xyz;
-    float below = max(uintBitsToFloat(floatBitsToUint(largest_component(flux)) & EXPONENT_BITS), FLUX_STEP_LEAST_POWER);
-    vec3 noise = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
-    return max(flux + noise * (FLUX_STEP_SHARE * below), vec3(0.0));
-}
-
 void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
     atomicAdd(photon_counters.deposits, 1u);
     PhotonKernel kernel;
@@ -141,7 +132,7 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     if (photon.throughput == vec3(0.0) || arrival_is_unlit(a)) {
         return false;
     }
-    if (HAS_ABSORPTION) {
+    if (HAS_ABSORPTION && !HAS_MEDIA) {
         photon.throughput = absorbed(photon.throughput, arrival_interior(a, walk_gathered[slot].interior), hit.t);
     }
     Bsdf bsdf = a.bsdf;
@@ -201,7 +192,7 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
         photon_differentials[slot] = footprint;
     }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
-        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : OUTSIDE;
+        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : HAS_MEDIA ? s.around : OUTSIDE;
     }
     if ((scattered.flags & LOBE_DIFFUSE) != 0u) {
         diffused = PHOTON_DIFFUSED;
@@ -210,7 +201,7 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     photon.origin = departure(a, wi, photon.throughput);
     photon.direction = normalize(wi);
     photon.bounce = path_set_joined(bounce + 1u, diffused);
-    walk_states_out[slot] = photon;
+    store_walk(slot, photon, HAS_MEDIA ? -way_left_out(s, photon.origin, photon.direction) : 0.0);
     return true;
 }
 
@@ -221,7 +212,15 @@ void main() {
     }
     uint slot = load_slot(place);
     uint flags = 0u;
-    if (scatter(slot, place, load_walk(slot), flags)) {
+    WalkState photon = load_walk(slot);
+    if (HAS_MEDIA) {
+        MediumEvent event = walk_medium_events[place];
+        if ((event.flags & EVENT_HANDLED) != 0u) {
+            return;
+        }
+        photon.throughput *= event.weight;
+    }
+    if (scatter(slot, place, photon, flags)) {
         flags |= FLAG_ALIVE;
     } else if (load_hit(place).triangle == NO_HIT) {
         atomicAdd(photon_counters.escaped, 1u);

@@ -15,10 +15,6 @@
 const uint PHOTON_DIMENSION_POINT = 0u;      // light, and point of it
 const uint PHOTON_DIMENSION_DIRECTION = 1u;  // side of the light, and direction
 
-// State of a photon's path, beside its number of bounces: whether it has been scattered diffusely.
-const uint PHOTON_UNDIFFUSED = 0u;
-const uint PHOTON_DIFFUSED = 1u;
-
 // What has become of photons.
 layout(set = 3, binding = 0, scalar) restrict buffer PhotonCounters {
     uint escaped;         // left the scene

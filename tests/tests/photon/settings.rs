@@ -332,18 +332,18 @@ fn what_cannot_be_is_refused_by_name() {
                 "{set}: {text}"
             );
         }
-        // Media, by the scene.
-        let fog = builtin("builtin:fog-box");
+        // Media that shine, by the scene.
+        let smoke = builtin("builtin:smoke?emission=1");
         let view = View {
-            camera: &fog.cameras[0],
+            camera: &smoke.cameras[0],
             size: SIZE,
             seed: 0,
             aovs: false,
         };
         let prepared =
-            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &fog), &view, &Settings::default()));
+            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &smoke), &view, &Settings::default()));
         match prepared {
-            Ok(_) => panic!("fog was accepted"),
+            Ok(_) => panic!("smoke that shines was accepted"),
             Err(error) => assert!(error.to_string().contains("media"), "{error}"),
         }
     });

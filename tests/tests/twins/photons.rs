@@ -1,9 +1,14 @@
 //! Photon differentials, kernels of photons and their records.
 
-use clerestory::gpu::shaders::constants::{PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS};
+use clerestory::gpu::shaders::constants::{
+    EVENT_LEAF_END, PHOTON_BOUNCE_SHIFT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
+};
 use clerestory::techniques::photon_mapping::kernel::{
     KernelProfile, KernelSettings, KernelShape, PhotonKernel, PhotonRecord, kernel_area, kernel_extent, kernel_profile,
     kernel_weight, pack_photon, photon_ends_leaf, photon_kernel, photon_weight, unpack_photon,
+};
+use clerestory::techniques::photon_mapping::volume::event::{
+    PhotonEvent, ball_profile, event_ends_leaf, pack_event, unpack_event,
 };
 use clerestory::transport::differentials::{
     Differentials, area_light_differentials, camera_differentials, diffuse_reemission, emission_differentials,
@@ -443,5 +448,59 @@ fn records_agree_with_their_twins() {
                 vec![if facing { weight } else { 0.0 }]
             },
         );
+    });
+}
+
+#[test]
+fn records_of_events_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(38, |r| {
+            let color = r.magnitude(-12, 8) * Vec3::new(r.unit(), r.unit(), r.unit());
+            // Clear of the rim, where the uniform profile jumps.
+            let d2 = r.choose(&[0.0, 0.2, 0.7, 0.98, 1.0, 1.5]);
+            let rest = [
+                r.magnitude(-10, 4),
+                code(r.below(1 << 20)),
+                code(r.below(80)),
+                r.choose(&[0.0, f32::from_bits(EVENT_LEAF_END)]),
+                code(r.below(3)),
+                d2,
+            ];
+            list32(&[10.0 * r.vector(), direction(r), color], &rest)
+        });
+        let results = twin_photons(gpu, 6, &table, &[]);
+        for (case, result) in table.iter().zip(&results) {
+            let at = |i: usize| Vec3::from_slice(&case.0[i..]);
+            let x = case.0.map(f64::from);
+            let event = PhotonEvent {
+                position: at(0),
+                direction: at(3),
+                flux: at(6),
+                radius: case.0[9],
+                medium: case.0[10].to_bits(),
+                bounce: case.0[11].to_bits(),
+            };
+            let mut words = pack_event(&event);
+            // Divisions may round otherwise than the twin's: a step of one coordinate.
+            for k in 0..2 {
+                let coordinate =
+                    |word: u32| i64::from((word >> (k * PHOTON_DIRECTION_BITS)) & ((1 << PHOTON_DIRECTION_BITS) - 1));
+                let step = (coordinate(result.bits(0)) - coordinate(words[0][3])).abs();
+                assert!(step <= 1, "{:?}", case.0);
+            }
+            assert_eq!(result.bits(0) >> PHOTON_BOUNCE_SHIFT, words[0][3] >> PHOTON_BOUNCE_SHIFT);
+            assert_eq!(result.bits(1), words[1][0], "{:?}", case.0);
+            words[0][3] = result.bits(0);
+            words[1][2] |= case.0[12].to_bits();
+            let back = unpack_event(&words);
+            for (i, value) in [(2, back.direction), (5, back.flux)] {
+                let off = (result.vector(i) - value.as_dvec3()).abs().max_element();
+                assert!(off <= 8.0 * U * f64::from(value.abs().max_element()), "{:?}", case.0);
+            }
+            assert_eq!((result.bits(8), result.bits(9)), (event.radius.to_bits(), event.medium));
+            assert_eq!((result.bits(10), result.bits(11) == 1), (back.bounce, event_ends_leaf(&words)));
+            let ball = ball_profile(PROFILES[case.0[13].to_bits() as usize], x[14]);
+            assert!((f64::from(result.0[12]) - ball).abs() <= 8.0 * U, "{:?}", case.0);
+        }
     });
 }

@@ -10,11 +10,12 @@ mod mapper;
 mod queue;
 mod settings;
 mod tracer;
+pub mod volume;
 
 pub(super) use card::CARD;
 pub use gather::GatherCounts;
 pub use map::{MapContents, map_contents};
-pub use mapper::{MappedPhoton, MapperCounts, PhotonMapper};
+pub use mapper::{MappedEvent, MappedPhoton, MapperCounts, PhotonMapper};
 pub use settings::{MapBuild, MapQuery, MapQueue, PhotonSettings};
 pub use tracer::PhotonCounts;
 pub(super) use tracer::{Append, PhotonPlan, PhotonTracer, Stored, Tracing};

@@ -2,6 +2,7 @@
 
 use super::kernel::{KernelProfile, KernelSettings, KernelShape};
 use super::tracer::{PhotonPlan, Stored};
+use super::volume::VolumeEstimate;
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
 use crate::techniques::path::SAMPLES_PER_WAVE;
@@ -105,6 +106,10 @@ crate::settings! {
         pub reduction: f32 = 2.0 / 3.0, in AboveTo(0.0, 1.0);
         /// Eye paths per pixel that query the same map.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
+        /// How photons that have collided in media are seen: under disks across each eye ray, one query for all of it, or under balls at places along it.
+        pub volume: VolumeEstimate = VolumeEstimate::Ray;
+        /// Radius of the kernels of photons in media, in the first pass; 0 for a fiftieth of the scene's diagonal.
+        pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
         /// Takes direct light from the map, too, instead of by shadow rays; cannot be combined with final_gather.
         pub direct_photons: bool = false;
         /// Sees the map after one more diffuse reflection, caustics directly; cannot be combined with direct_photons.
@@ -200,6 +205,24 @@ impl PhotonSettings {
         }
     }
 
+    /// Radius of the kernels of events in media, m, in a pass, in a scene of that diagonal: the area of disks, or the volume of balls, falls from pass to pass as
+    /// [`reduction`](PhotonSettings::reduction) says.
+    ///
+    /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011.
+    pub(super) fn event_radius(&self, pass: u32, diagonal: f64) -> f64 {
+        let first = match f64::from(self.volume_radius) {
+            0.0 if diagonal > 0.0 => RADIUS_SHARE * diagonal,
+            0.0 => 1.0,
+            set => set,
+        };
+        let shrunk = shrinkage(pass, f64::from(self.reduction));
+        first
+            * match self.volume {
+                VolumeEstimate::Ray => shrunk,
+                VolumeEstimate::March => shrunk.powf(2.0 / 3.0),
+            }
+    }
+
     /// How photons are traced.
     pub(super) fn plan(&self) -> PhotonPlan {
         PhotonPlan {
@@ -235,11 +258,11 @@ impl PhotonSettings {
     }
 
     /// What eye paths gather by themselves: light seen through specular and glossy scattering, and direct light at the first diffuse surface
-    /// (with a final gather, at the second too).
+    /// (with a final gather, at the second too), in scenes with media also at the first scattering in a medium.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for a path set that is more than a range of bounces.
-    pub(super) fn eye_paths(&self) -> Result<PathSet> {
+    pub(super) fn eye_paths(&self, has_media: bool) -> Result<PathSet> {
         if self.path_set != PathSet::new(self.path_set.min_bounces(), self.path_set.max_bounces(), PATH_SET_LOBES)? {
             return Err(Error::Unsupported {
                 technique: "photon".into(),
@@ -254,10 +277,12 @@ impl PhotonSettings {
             let cause = format!("counts more than {PHOTON_BOUNCE_MAX} bounces, which records of photons cannot");
             return Err(Error::setting("path_set", self.path_set, cause));
         }
-        let seen = match (self.direct_photons, self.final_gather) {
-            (true, _) => "L[SG]*E",
-            (false, false) => "LD?[SG]*E",
-            (false, true) => "L[SG]*E|LD[SG]*E|LD[SG]*D[SG]*E",
+        let seen = match (self.direct_photons, self.final_gather, has_media) {
+            (true, _, _) => "L[SG]*E",
+            (false, false, false) => "LD?[SG]*E",
+            (false, true, false) => "L[SG]*E|LD[SG]*E|LD[SG]*D[SG]*E",
+            (false, false, true) => "L[DV]?[SG]*E",
+            (false, true, true) => "L[SG]*E|L[DV][SG]*E|L[DV][SG]*D[SG]*E",
         };
         let seen: PathSet = seen.parse()?;
         if !self.needs_photons() {

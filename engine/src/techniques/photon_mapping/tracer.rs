@@ -12,6 +12,7 @@
 use std::sync::Arc;
 
 use super::kernel::KernelSettings;
+use super::volume::{Room, VolumePass, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
@@ -46,7 +47,7 @@ pub struct PhotonCounts {
     pub emitted: u64,
     /// Photons that left the scene.
     pub escaped: u64,
-    /// Photons that ended on a surface: by roulette, where nothing is scattered, or after the last bounce.
+    /// Photons that ended on a surface or in a medium: by roulette, where nothing is scattered, or after the last bounce.
     pub absorbed: u64,
     /// Rays traced.
     pub rays: u64,
@@ -54,6 +55,10 @@ pub struct PhotonCounts {
     pub deposits: u64,
     /// Those that were not, since their footprint is degenerate.
     pub without_kernel: u64,
+    /// Collisions with media.
+    pub collisions: u64,
+    /// Those that were stored.
+    pub events: u64,
 }
 
 impl std::ops::AddAssign for PhotonCounts {
@@ -64,6 +69,8 @@ impl std::ops::AddAssign for PhotonCounts {
         self.rays += other.rays;
         self.deposits += other.deposits;
         self.without_kernel += other.without_kernel;
+        self.collisions += other.collisions;
+        self.events += other.events;
     }
 }
 
@@ -174,6 +181,8 @@ impl Append for PhotonAppend {
 pub(in crate::techniques) struct Traced {
     /// Records in [`PhotonTracer::records`].
     pub records: u32,
+    /// Those in [`PhotonTracer::events`].
+    pub events: u32,
     pub counts: PhotonCounts,
     pub timings: Vec<Timings>,
 }
@@ -183,6 +192,8 @@ pub(in crate::techniques) struct Tracing {
     pass: u32,
     /// None for deposits that have none.
     kernel: Option<KernelSettings>,
+    /// Of the kernels of events in media, m.
+    event_radius: f64,
     /// First photon of the wave under way, or of the next one.
     first_photon: u32,
     wave: Option<(WalkKey, WaveInFlight)>,
@@ -193,6 +204,11 @@ impl Tracing {
     /// The timings of the submissions since they were taken last.
     pub fn take_timings(&mut self) -> Vec<Timings> {
         std::mem::take(&mut self.traced.timings)
+    }
+
+    /// With kernels of this radius, m, for events in media.
+    pub fn with_event_radius(self, event_radius: f64) -> Self {
+        Self { event_radius, ..self }
     }
 
     /// What has been traced.
@@ -225,15 +241,19 @@ struct Kit {
     capacity: u32,
     /// [`GpuScene::emission_choice`].
     emission: Option<TexelView>,
+    /// Only in scenes with media.
+    volume: Option<VolumeTrace>,
 }
 
 /// The stages of a wave of photons.
 struct PhotonStages<'a> {
     kit: &'a Kit,
     key: WalkKey,
-    /// Record of the wave's first deposit.
+    /// Record of the wave's first deposit on a surface, and of its first one in a medium.
     first: u32,
+    first_event: u32,
     kernel: Option<&'a KernelSettings>,
+    event_radius: f64,
 }
 
 impl PhotonTracer {
@@ -265,13 +285,14 @@ impl PhotonTracer {
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
             even_survival: plan.even_survival,
+            has_media: profile.media.any(),
             ..Default::default()
         });
         let wanted = plan.photons.next_multiple_of(WALK_GROUP);
         let slots = wanted.min(default_slots(gpu)).min(slots_of_device(gpu));
         let needs = WaveNeeds {
             waiting: true,
-            media: false,
+            media: profile.media.any(),
             airlight: false,
         };
         let options = WalkOptions {
@@ -286,6 +307,8 @@ impl PhotonTracer {
         let quarters = append.quarters();
         let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
+        let volume = || VolumeTrace::new(gpu, &scene, plan.sampler, slots, plan.photons);
+        let volume = profile.media.any().then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
             kit: Kit {
@@ -301,6 +324,7 @@ impl PhotonTracer {
                 records: record_texels(gpu, capacity, quarters)?,
                 capacity,
                 emission: scene.emission_choice(gpu)?,
+                volume,
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
@@ -321,9 +345,18 @@ impl PhotonTracer {
         &self.kit.records
     }
 
+    /// The events in media of the last pass, in the same order; none in scenes without media.
+    pub fn events(&self) -> Option<&TexelView> {
+        self.kit.volume.as_ref().map(VolumeTrace::events)
+    }
+
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let kit = &self.kit;
-        let mut all = vec![kit.emit.info(), kit.scatter.info(), kit.append.pipeline()];
+        let mut all = vec![kit.emit.info(), kit.scatter.info()];
+        match &kit.volume {
+            Some(volume) => all.extend(volume.pipelines()),
+            None => all.push(kit.append.pipeline()),
+        }
         all.extend(self.walker.trace_pipelines());
         all.extend(self.walker.compaction_pipelines());
         all
@@ -331,7 +364,12 @@ impl PhotonTracer {
 
     /// Traces the photons of a pass with kernels so made, if their deposits have some.
     pub fn trace(&mut self, pass: u32, kernel: Option<&KernelSettings>) -> Result<Traced> {
-        let mut tracing = self.begin(pass, kernel);
+        let tracing = self.begin(pass, kernel);
+        self.finish(tracing)
+    }
+
+    /// Traces the photons that are left of a pass.
+    pub fn finish(&mut self, mut tracing: Tracing) -> Result<Traced> {
         while !self.advance(&mut tracing)? {}
         Ok(tracing.traced)
     }
@@ -341,6 +379,7 @@ impl PhotonTracer {
         Tracing {
             pass,
             kernel: kernel.copied(),
+            event_radius: 0.0,
             first_photon: 0,
             wave: None,
             traced: Traced::default(),
@@ -370,7 +409,9 @@ impl PhotonTracer {
             kit: &self.kit,
             key: *key,
             first: tracing.traced.records,
+            first_event: tracing.traced.events,
             kernel: tracing.kernel.as_ref(),
+            event_radius: tracing.event_radius,
         };
         self.walker.advance(wave, &mut stages)?;
         tracing.traced.timings.append(&mut wave.take_timings());
@@ -387,12 +428,17 @@ impl PhotonTracer {
     fn end_wave(&mut self, tracing: &mut Tracing, photons: u32, walked: &Walked) -> Result<bool> {
         let counters = self.kit.counters_readback.read::<Counters>(0, 1)?[0];
         let traced = &mut tracing.traced;
-        // What waits are the deposits with a kernel.
-        let records = u32::try_from(walked.waited).unwrap_or(u32::MAX);
+        let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
+        let [absorbed, events] = volume.unwrap_or_default();
+        // What waits are the deposits with a kernel, and the events in media.
+        let records = u32::try_from(walked.waited - u64::from(events)).unwrap_or(u32::MAX);
         traced.records = traced.records.saturating_add(records);
+        traced.events = traced.events.saturating_add(events);
+        traced.counts.events += u64::from(events);
+        traced.counts.collisions += walked.media.collisions;
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
-        traced.counts.absorbed += u64::from(counters.absorbed);
+        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
@@ -400,8 +446,12 @@ impl PhotonTracer {
             return Ok(false);
         }
         traced.counts.emitted = u64::from(self.plan.photons);
-        if traced.records <= self.kit.capacity {
+        let events_fit = self.kit.volume.as_ref().is_none_or(|volume| traced.events <= volume.capacity());
+        if traced.records <= self.kit.capacity && events_fit {
             return Ok(true);
+        }
+        if let Some(volume) = self.kit.volume.as_mut().filter(|_| !events_fit) {
+            volume.grow(&self.gpu, traced.events)?;
         }
         let quarters = self.kit.append.quarters();
         let (needed, most) = (u64::from(traced.records), records_of_device(&self.gpu, quarters));
@@ -414,9 +464,11 @@ impl PhotonTracer {
                 instead: self.kit.append.fewer().into(),
             });
         }
-        let capacity = (needed + needed / 4).min(most) as u32;
-        self.kit.records = record_texels(&self.gpu, capacity, quarters)?;
-        self.kit.capacity = capacity;
+        if traced.records > self.kit.capacity {
+            let capacity = (needed + needed / 4).min(most) as u32;
+            self.kit.records = record_texels(&self.gpu, capacity, quarters)?;
+            self.kit.capacity = capacity;
+        }
         let timings = std::mem::take(&mut traced.timings);
         *traced = Traced {
             timings,
@@ -439,6 +491,7 @@ impl Kit {
 
 impl WalkStages for PhotonStages<'_> {
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.reset(pass))?;
         pass.fill(self.kit.counters.view(), 0)
     }
 
@@ -464,6 +517,18 @@ impl WalkStages for PhotonStages<'_> {
 
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let (kit, kernel) = (self.kit, self.kernel);
+        if let Some(volume) = &kit.volume {
+            let told = VolumePass {
+                key: self.key,
+                first_deposit: kit.stored.first_bounce,
+                last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
+                flux_scale: flux_scale(&kit.scene) as f32,
+                radius: self.event_radius as f32,
+            };
+            recorder.pass("photon: medium", |pass| {
+                volume.record_medium(pass, bounce, &kit.scene, told)
+            })?;
+        }
         let [lower, upper] = kit.scene.bounds();
         let push = photon_scatter::Push {
             scene_lower: lower.to_array(),
@@ -497,6 +562,19 @@ impl WalkStages for PhotonStages<'_> {
         let kit = self.kit;
         recorder.pass("photon: append", |pass| {
             let own = kit.wave_set();
+            if let Some(volume) = &kit.volume {
+                let rooms = [
+                    Room {
+                        first: self.first,
+                        capacity: kit.capacity,
+                    },
+                    Room {
+                        first: self.first_event,
+                        capacity: volume.capacity(),
+                    },
+                ];
+                return volume.record_append(pass, bounce, &own, rooms);
+            }
             kit.append
                 .append(pass, bounce, &kit.scene, &own, self.first, kit.capacity)?;
             stage_barrier(pass);
@@ -505,6 +583,7 @@ impl WalkStages for PhotonStages<'_> {
     }
 
     fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.read_back(pass))?;
         pass.copy(self.kit.counters.view(), self.kit.counters_readback.view())
     }
 }
@@ -537,9 +616,9 @@ fn record_texels(gpu: &Gpu, records: u32, of_record: u32) -> Result<TexelView> {
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "PM-PH-1",
-        name: "photon tracing on surfaces, from every kind of light",
+        name: "photon tracing from every kind of light",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Surfaces only; unlit surfaces send no photons.",
+        limits: "Unlit surfaces and media that emit send no photons.",
         sources: &[
             sources::JENSEN_2001.whole(),
             sources::FABIANOWSKI_2011.at("§3.4.1 and §5.2.3"),

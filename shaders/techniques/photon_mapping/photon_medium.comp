@@ -1,0 +1,174 @@
+#version 460
+// Photons on their way through media: free flight to a collision, where it is stored and scattered, or absorbed; on through a boundary; or with what is left
+// of it to the surface, for photon_scatter.comp.
+//
+// Free flights are those of eye paths (transport/medium.glsl, transport/media_tracking.glsl): analytic in homogeneous media, delta tracking in grids, one walk
+// for all bands. A collision stores the flux that it scatters; the photon goes on with the probability that leaves its largest band as it is. Where a medium
+// scatters nothing there are no collisions, and light is weighted by the transmittance instead.
+//
+// PM-PH-1, PM-PD-12: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.1.3 and 7.2.3; H. W. Jensen and P. H. Christensen, "Efficient Simulation of
+// Light Transport in Scenes with Participating Media Using Photon Maps", 1998. Deterministic in (seed, pass, photon).
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/features.glsl"
+#include "transport/media_features.glsl"
+#include "techniques/photon_mapping/photon_volume.glsl"
+#include "transport/path_set.glsl"
+#include "walk/media.glsl"
+
+layout(push_constant, scalar) uniform Push {
+    WalkKey key;         // the sequence is the pass, places in it photons
+    uint surrounding;    // index of the medium outside all bodies, or NO_MEDIUM
+    uint last_bounce;    // greatest number of scatterings before a collision that is stored
+    uint first_deposit;  // least
+    float flux_scale;    // of fluxes as they are stored
+    float radius;        // of kernels
+} push;
+
+#include "walk/draws.glsl"
+#include "techniques/photon_mapping/photon_flux.glsl"
+#include "transport/bodies.glsl"
+#include "transport/media_tracking.glsl"
+#include "transport/phase.glsl"
+#include "walk/survival.glsl"
+
+// Stores a collision at `at`, after which the photon has the flux that is scattered.
+uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at) {
+    atomicAdd(photon_medium_counters.events, 1u);
+    uint bounce = path_set_bounce(photon.bounce);
+    uvec4 q0;
+    uvec4 q1;
+    vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
+    pack_event(PhotonEvent(at, photon.direction, flux, push.radius, medium, bounce), q0, q1);
+    store_waiting(place, q0, q1, uvec4(0u));
+    return FLAG_WAITING | FLAG_VOLUME;
+}
+
+// The photon's new direction at a collision, which has left `photon.throughput` of what there was `before`; false when it ends.
+bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, inout WalkState photon) {
+    uint bounce = path_set_bounce(photon.bounce);
+    if (bounce >= push.last_bounce) {
+        return false;
+    }
+    float survival = walk_survival(before, photon.throughput, bounce);
+    // Also ends a photon whose flux is not a number.
+    if (!(bounce_sample(slot, bounce, DIMENSION_SIDE).y < survival)) {
+        return false;
+    }
+    vec2 u = bounce_sample(slot, bounce, DIMENSION_DIRECTION);
+    float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
+    photon.direction = normalize(phase_direction(photon.direction, c, u.y));
+    photon.origin = at;
+    photon.throughput /= survival;
+    photon.bounce = path_set_joined(bounce + 1u, PHOTON_DIFFUSED);
+    return true;
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    if (status.stalled != STALLED_NOT || place >= status.active_count) {
+        return;
+    }
+    if (HAS_GRIDS) {
+        if (walk_resume[place] == PLACE_SCATTERED) {
+            return;
+        }
+        if (!has_work_left()) {
+            leave_for_later(STALLED_SCATTER);
+            return;
+        }
+        walk_resume[place] = PLACE_SCATTERED;
+    }
+    uint slot = load_slot(place);
+    WalkState photon = load_walk(slot);
+    MediumState state = MediumState(vec3(1.0 / 3.0), 0.0);
+    if (status.rounds > 0u) {
+        state = walk_medium_states[slot];
+    }
+    Hit hit = load_hit(place);
+    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (hit.triangle != NO_HIT) {
+        crossing = cross_surface(hit.triangle, photon.direction, walk_gathered[slot].interior);
+    }
+    float end = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start);
+    uint medium = medium_inside(crossing.interior, push.surrounding);
+    vec3 weight = vec3(1.0);
+    uint outcome = GRID_LEFT;
+    SceneMedium m;
+    float t = 0.0;  // of a collision, or of a stop, along the ray
+    if (medium != NO_MEDIUM && end > state.start) {
+        m = load_medium(medium);
+        bool passes = m.sigma_s == vec3(0.0);
+        uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
+        if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
+            float t_max = end >= FAR_AWAY ? FAR_AWAY : end - state.start;
+            if (passes) {
+                weight = transmittance(m.sigma_t, t_max);
+            } else {
+                Sampler s = walk_sampler(slot, dimension);
+                FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, state.bands, t_max, sample_2d(s));
+                weight = flight.weight;
+                state.bands = flight.bands;
+                outcome = flight.collides ? GRID_COLLIDED : GRID_LEFT;
+                t = state.start + flight.t;
+            }
+        } else if (HAS_GRIDS) {
+            uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
+            GridWalk walk = begin_grid_walk(m, photon.origin, photon.direction, state.start, end);
+            vec3 emitted = vec3(0.0);
+            outcome = delta_tracking(m, key, vec3(0.0), passes, walk, state.bands, weight, emitted);
+            t = walk.entry + walk.t;
+            float reached = resumed_start(state.start, t);
+            // The search that goes on from the surface itself would miss it.
+            outcome = outcome == GRID_STOPPED && reached >= end ? GRID_LEFT : outcome;
+            t = outcome == GRID_STOPPED ? reached : t;
+            COUNT_MEDIUM(null_collisions, walk.nulls)
+            COUNT_MEDIUM(density_lookups, walk.nulls + (outcome == GRID_COLLIDED ? 1u : 0u))
+            count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
+        }
+        COUNT_MEDIUM(collisions, outcome == GRID_COLLIDED ? 1u : 0u)
+    }
+    if (HAS_ABSORPTION && crossing.interior != OUTSIDE && outcome == GRID_LEFT) {
+        weight *= exp(-load_material(crossing.interior).absorption * (end - max(state.start, 0.0)));
+    }
+    bool handled = true;
+    bool alive = false;
+    uint interior = crossing.interior;
+    uint flags = 0u;
+    vec3 before = photon.throughput;
+    photon.throughput *= weight;
+    if (outcome == GRID_COLLIDED) {
+        if (photon.throughput != vec3(0.0)) {
+            // What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
+            vec3 at = photon.origin + max(t, 0.0) * photon.direction;
+            if (path_set_bounce(photon.bounce) >= push.first_deposit) {
+                flags = deposit(slot, place, photon, medium, at);
+            }
+            alive = scatter(slot, m, before, at, photon);
+            state.start = 0.0;
+        }
+    } else if (outcome == GRID_STOPPED) {
+        state.start = t;
+        alive = photon.throughput != vec3(0.0);
+    } else if (crossing.boundary) {
+        state.start = past_surface(hit.t);
+        interior = crossing.beyond;
+        alive = photon.throughput != vec3(0.0);
+    } else {
+        handled = false;
+    }
+    walk_gathered[slot].interior = interior;
+    walk_medium_states[slot] = state;
+    walk_medium_events[place] = MediumEvent(weight, handled ? EVENT_HANDLED : 0u);
+    if (handled) {
+        walk_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);
+        if (alive) {
+            walk_states_out[slot] = photon;
+        } else {
+            atomicAdd(photon_medium_counters.absorbed, 1u);
+        }
+    }
+}

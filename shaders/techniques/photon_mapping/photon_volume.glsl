@@ -1,0 +1,29 @@
+// What the stages share that put events of photons in media behind each other: a bounce's deposits wait in one queue, of surfaces and of media, in the order of
+// the walks. Flags by place of the queue say which they are, prefix sums of the flags how many of media come before, so that both kinds get to the ends of
+// their own records in the order of the queue: the same order on every run.
+#ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_VOLUME_GLSL
+#define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_VOLUME_GLSL
+
+#include "techniques/photon_mapping/photon_event.glsl"
+#include "walk/wave.glsl"
+
+// descriptor set 1: PhotonVolumeSet
+
+// What waits at a place is an event in a medium; beside the flags of walk/wave.glsl.
+const uint FLAG_VOLUME = 16u;
+
+layout(set = 1, binding = 0, scalar) restrict buffer PhotonMediumCounters {
+    uint absorbed;  // photons that a collision has ended
+    uint events;    // collisions that were stored
+} photon_medium_counters;
+// Of the wave; its first stage of a bounce keeps it.
+layout(set = 1, binding = 1, scalar) restrict buffer PhotonVolumeQueue {
+    uint before;     // events of earlier bounces
+    uint in_bounce;  // those of the last bounce that has been appended
+} photon_volume_queue;
+layout(set = 1, binding = 2, scalar) restrict buffer PhotonVolumeWaiting { uint waiting; } photon_volume_waiting;
+layout(set = 1, binding = 3, scalar) restrict buffer PhotonVolumeFlags { uint photon_volume_flags[]; };  // by place of the waiting queue
+layout(set = 1, binding = 4, scalar) restrict readonly buffer PhotonVolumeRanks { uint photon_volume_ranks[]; };
+layout(set = 1, binding = 5, scalar) restrict writeonly buffer PhotonVolumeRecords { uvec4 photon_volume_records[]; };
+
+#endif
