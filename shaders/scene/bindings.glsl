@@ -185,7 +185,7 @@ SceneLight load_light(uint index) {
     vec4 q1 = uintBitsToFloat(texelFetch(scene_lights, first + 1));
     vec4 q2 = uintBitsToFloat(texelFetch(scene_lights, first + 2));
     vec4 q3 = uintBitsToFloat(texelFetch(scene_lights, first + 3));
-    return SceneLight(q0.x, q0.y, q0.zw, q1.xyz, q1.w, q2.xyz, q2.w, q3.xyz, q3.w);
+    return SceneLight(q0.x, q0.y, q0.z, q0.w, q1.xyz, q1.w, q2.xyz, q2.w, q3.xyz, q3.w);
 }
 
 SceneLightNode load_light_node(uint index) {

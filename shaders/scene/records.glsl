@@ -104,7 +104,8 @@ struct SceneTexture {
 struct SceneLight {
     uint kind;
     uint triangle;
-    uvec2 spare;
+    uint around;        // material of the body that it is inside of, plus one; 0 without, and where nothing asks
+    uint spare;
     vec3 position;      // point, spot
     float cos_inner;
     vec3 direction;     // spot axis, direction of travel

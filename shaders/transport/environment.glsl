@@ -66,34 +66,48 @@ vec2 environment_rims(uint row, uint height, out bool south) {
     return s * s;
 }
 
+// What a direction meets: its cell, and the map there.
+struct EnvironmentPlace {
+    uvec2 cell;
+    vec2 within;
+    mat4 corners;
+    vec4 luminances;  // at them, above what is left to scattered rays
+    float luminance;  // between them
+    vec2 rims;
+};
+
+EnvironmentPlace environment_place(uvec2 size, float left_out, vec3 w) {
+    EnvironmentPlace p;
+    p.cell = environment_cell(environment_uv(w), size, p.within);
+    p.corners = environment_corners(p.cell, size);
+    p.luminances = environment_luminances(p.corners, left_out);
+    bool south;
+    p.rims = environment_rims(p.cell.y, size.y, south);
+    float rim = 0.5 * dot(w.xz, w.xz) / (1.0 + (south ? -w.y : w.y));
+    float from_rim = clamp((rim - p.rims.x) / (p.rims.y - p.rims.x), 0.0, 1.0);
+    vec2 sides = environment_sides(p.luminances, south ? 1.0 - from_rim : from_rim);
+    p.luminance = mix(sides.x, sides.y, p.within.x);
+    return p;
+}
+
+// What luminances in a cell are multiplied by for the density per solid angle, where the cell is chosen with a probability.
+float environment_factor(float probability, vec4 luminances, vec2 rims, uint width) {
+    float solid_angle = 4.0 * PI * (rims.y - rims.x) / float(width);
+    return probability / (dot(luminances, vec4(0.25)) * solid_angle);
+}
+
 // Radiance from a direction, and in the last component the density of environment_sample there.
 vec4 environment_look_up(uvec2 size, float left_out, vec3 w) {
-    vec2 within;
-    uvec2 cell = environment_cell(environment_uv(w), size, within);
-    mat4 corners = environment_corners(cell, size);
-    bool south;
-    vec2 rims = environment_rims(cell.y, size.y, south);
-    float rim = 0.5 * dot(w.xz, w.xz) / (1.0 + (south ? -w.y : w.y));
-    float from_rim = clamp((rim - rims.x) / (rims.y - rims.x), 0.0, 1.0);
-    vec2 sides = environment_sides(environment_luminances(corners, left_out), south ? 1.0 - from_rim : from_rim);
-    return vec4(environment_interpolated(corners, within), corners[2].a * mix(sides.x, sides.y, within.x));
+    EnvironmentPlace p = environment_place(size, left_out, w);
+    return vec4(environment_interpolated(p.corners, p.within), p.corners[2].a * p.luminance);
 }
 
 // Density of environment_sample in a direction, by the tables of emission that begin at `base`, sr^-1.
 float environment_emission_pdf(uint base, uvec2 size, vec3 w) {
-    vec2 within;
-    uvec2 cell = environment_cell(environment_uv(w), size, within);
-    bool south;
-    vec2 rims = environment_rims(cell.y, size.y, south);
-    float rim = 0.5 * dot(w.xz, w.xz) / (1.0 + (south ? -w.y : w.y));
-    float from_rim = clamp((rim - rims.x) / (rims.y - rims.x), 0.0, 1.0);
-    vec4 luminances = environment_luminances(environment_corners(cell, size), 0.0);
-    float down = south ? 1.0 - from_rim : from_rim;
-    vec2 sides = environment_sides(luminances, down);
-    uvec2 grid = uvec2(size.x, size.y + 1u);
-    float probability = distribution_probability(base, cell.y) * distribution_probability(distribution_row_base(base, grid, cell.y), cell.x);
-    float solid_angle = 4.0 * PI * (rims.y - rims.x) / float(size.x);
-    return probability / (dot(luminances, vec4(0.25)) * solid_angle) * mix(sides.x, sides.y, within.x);
+    EnvironmentPlace p = environment_place(size, 0.0, w);
+    uint row = distribution_row_base(base, uvec2(size.x, size.y + 1u), p.cell.y);
+    float probability = distribution_probability(base, p.cell.y) * distribution_probability(row, p.cell.x);
+    return environment_factor(probability, p.luminances, p.rims, size.x) * p.luminance;
 }
 
 // A direction that two words choose; `found` is environment_look_up there. The tables of emission, which have all of the light, are not those
@@ -114,8 +128,7 @@ vec3 environment_sample(uint base, uvec2 size, float left_out, bool emission, uv
     float phi = 2.0 * PI * ((float(cell.x) + 0.5 + around) / float(size.x) - 0.5);
     float row = atan(r, y) * INV_PI * float(size.y) + 0.5;
     vec2 within = vec2(around, clamp(row - float(cell.y), 0.0, 1.0));
-    float solid_angle = 4.0 * PI * (rims.y - rims.x) / float(size.x);
-    float factor = emission ? probability / (dot(luminances, vec4(0.25)) * solid_angle) : corners[2].a;
+    float factor = emission ? environment_factor(probability, luminances, rims, size.x) : corners[2].a;
     found = vec4(environment_interpolated(corners, within), factor * mix(sides.x, sides.y, around));
     return vec3(r * sin(phi), y, -r * cos(phi));
 }

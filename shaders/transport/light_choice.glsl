@@ -156,30 +156,38 @@ LightSample light_seen(LightPoint p, vec3 from) {
     return result;
 }
 
-// A light, and a point or a direction of it, by one point of the unit square in two words. Zero radiance when there is nothing to see.
-LightSample sample_light(LightReceiver receiver, uvec2 word, vec3 scene_lower, vec3 scene_upper) {
-    uvec3 fresh = pcg3d(uvec3(word, 0u));
-    LightChoice choice = choose_light(receiver, word, fresh.x);
-    SceneLight light = choice.light;
+// A point or a direction of a light that the first of two words has chosen; `point` is set for lights with a place. Of the environment all light is
+// found by the tables of emission, and without them what is not left to scattered rays. Zero radiance when there is nothing to see.
+LightSample sample_chosen_light(LightChoice choice, vec3 from, uvec2 word, uvec2 fresh, bool emission, vec3 scene_lower, vec3 scene_upper,
+                                out LightPoint point) {
     LightSample result = no_light();
     result.choice = choice;
-    if (HAS_ENVIRONMENT && light.kind == LIGHT_ENVIRONMENT) {
+    if (HAS_ENVIRONMENT && choice.light.kind == LIGHT_ENVIRONMENT) {
         vec4 found;
         SceneEnvironment e = load_environment();
-        vec3 local = environment_sample(environment_cdf_base(), environment_size(e), e.left_out, false, word, fresh.yz, found);
+        vec3 local = environment_sample(environment_cdf_base(), environment_size(e), emission ? 0.0 : e.left_out, emission, word, fresh, found);
         result.direction = environment_to_world(e, local);
         result.pdf = found.a * choice.probability;
         result.radiance = result.pdf > 0.0 ? found.rgb / result.pdf : vec3(0.0);
         result.infinite = true;
         return result;
     }
-    if (HAS_PUNCTUAL_LIGHTS && light.kind == LIGHT_DIRECTIONAL) {
-        result.direction = -light.direction;
-        result.radiance = light.strength / choice.probability;
+    if (HAS_PUNCTUAL_LIGHTS && choice.light.kind == LIGHT_DIRECTIONAL) {
+        result.direction = -choice.light.direction;
+        result.radiance = choice.light.strength / choice.probability;
         result.infinite = true;
         return result;
     }
-    return light_seen(light_point(choice, word, scene_lower, scene_upper), receiver.position);
+    point = light_point(choice, word, scene_lower, scene_upper);
+    return light_seen(point, from);
+}
+
+// A light, and a point or a direction of it, by one point of the unit square in two words. Zero radiance when there is nothing to see.
+LightSample sample_light(LightReceiver receiver, uvec2 word, vec3 scene_lower, vec3 scene_upper) {
+    uvec3 fresh = pcg3d(uvec3(word, 0u));
+    LightChoice choice = choose_light(receiver, word, fresh.x);
+    LightPoint point;
+    return sample_chosen_light(choice, receiver.position, word, fresh.yz, false, scene_lower, scene_upper, point);
 }
 
 #endif

@@ -2,7 +2,11 @@
 #ifndef CLERESTORY_WALK_DIMENSIONS_GLSL
 #define CLERESTORY_WALK_DIMENSIONS_GLSL
 
-// Those before are for a walk's start. From here on each bounce has DIMENSIONS_PER_BOUNCE slots.
+// A walk's start: for eye paths the first slot alone.
+const uint DIMENSION_START_POINT = 0u;      // light, and point of it
+const uint DIMENSION_START_DIRECTION = 1u;  // side of the light, and direction
+
+// From here on each bounce has DIMENSIONS_PER_BOUNCE slots.
 const uint DIMENSION_FIRST_BOUNCE = 2u;
 const uint DIMENSIONS_PER_BOUNCE = 3u;
 const uint DIMENSION_DIRECTION = 0u;  // lobe, and direction within it

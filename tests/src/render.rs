@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use clerestory::film::z_test::{RELATIVE_DEVIATION_FLOOR, SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
-use clerestory::scene::{Camera, Scene};
+use clerestory::scene::{Camera, LightKind, Material, Scene};
 use clerestory::techniques::path::PathCounters;
 use clerestory::techniques::{PathTracer, PathTracerSettings, Technique};
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathSet};
 pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, floor_from_above, lamp, point_triangle};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::statistics::expect_mean;
 
@@ -24,6 +24,24 @@ pub fn camera_aslant() -> Camera {
         DVec3::Y,
         0.7,
     )
+}
+
+/// Places a rough body into a room that absorbs what goes through it, colour by colour, and a matte plate and a point light into the body.
+pub fn add_lit_body(scene: &mut Scene, intensity: f32) {
+    let tinted = scene.add_material(Material {
+        roughness: 0.6,
+        attenuation_color: Vec3::new(0.2, 0.5, 0.8),
+        attenuation_distance: 0.3,
+        ..Material::glass("tinted", 1.3)
+    });
+    let matte = scene.add_material(Material::lambert("matte", Vec3::splat(0.8)));
+    let corner = Vec3::new(-0.2, -0.9, -0.85);
+    scene.place(cuboid("body", tinted, corner, corner + Vec3::new(0.9, 1.0, 0.9)));
+    let plate = corner + Vec3::new(0.2, 0.3, 0.2);
+    scene.place(cuboid("plate", matte, plate, plate + Vec3::new(0.5, 0.1, 0.5)));
+    let position = corner + Vec3::new(0.4, 0.75, 0.5);
+    let intensity = Vec3::splat(intensity);
+    scene.add_light("inside", LightKind::Point { position, intensity });
 }
 
 /// A finished picture.

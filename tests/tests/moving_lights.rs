@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use clerestory::gpu::Gpu;
-use clerestory::scene::{LightKind, Scene};
+use clerestory::scene::{LightKind, Material, Scene};
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::GpuScene;
-use clerestory_tests::render::{builtin, finish, upload};
+use clerestory_tests::render::{builtin, cuboid, finish, upload};
 use clerestory_tests::with_gpu;
 use glam::{Quat, Vec3};
 
@@ -122,6 +122,37 @@ fn pictures_are_those_of_a_scene_made_with_the_light_there() {
         let other_seed = of_moving.each_mut().map(|picture| picture(4));
         assert!((0..2).all(|i| first[i] != other_seed[i]), "the seed stays");
         assert!(of_moving.each_mut().map(|picture| picture(3)) == first, "not as before");
+    });
+}
+
+/// Photons of a light that has come into a body that absorbs.
+#[test]
+fn a_light_that_moves_into_a_body_is_inside() {
+    with_gpu(|gpu| {
+        let mut before = builtin("builtin:cornell-box");
+        let tinted = before.add_material(Material {
+            attenuation_color: Vec3::new(0.2, 0.5, 0.8),
+            attenuation_distance: 0.05,
+            ..Material::glass("tinted", 1.5)
+        });
+        // About the tall block, which shows what its light has lost.
+        before.place(cuboid(
+            "body",
+            tinted,
+            Vec3::new(0.2, 0.01, -0.5),
+            Vec3::new(0.5, 0.45, -0.2),
+        ));
+        let light = |y: f32| LightKind::Point {
+            position: Vec3::new(0.35, y, -0.35),
+            intensity: Vec3::ONE,
+        };
+        let mut after = before.clone();
+        before.add_light("point", light(0.5));
+        after.add_light("point", light(0.42));
+        let [moving, made_so] = [&before, &after].map(|scene| upload(gpu, scene));
+        moving.move_light(gpu, 0, &after.lights[0].kind).expect("moves");
+        let [found, expected] = [moving, made_so].map(|scene| photon_mapper(gpu, &scene, &before)(3));
+        assert!(found == expected, "not as if made so");
     });
 }
 

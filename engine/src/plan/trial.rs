@@ -243,9 +243,10 @@ impl<'a> Trial<'a> {
     fn begin_pilot(&self, asked: &Asked<'_>, size: [u32; 2], [pair, which]: [u32; 2]) -> Result<Rendering> {
         // The picture itself has the seed at 0.
         let steps = 2 * (self.index * SEED_PAIRS + pair) + which + 1;
+        let settings = (self.card.foresight.pilot)(&self.settings, asked.options.size, size)?;
         let pilot = RenderOptions {
             technique: Some(self.card.id.into()),
-            settings: self.settings.clone(),
+            settings,
             size,
             spp: 1,
             seed: asked.options.seed.wrapping_add(steps.wrapping_mul(SEED_STEP)),

@@ -16,6 +16,9 @@ pub struct Foresight {
     /// What of these light paths its pictures of a scene with these lights lack, however many samples they have, in words that follow
     /// "it misses"; `None` where they lack none.
     pub misses: fn(&SceneProfile, &[Light], &PathSet) -> Result<Option<String>>,
+    /// Settings of a pilot picture of the second size, in place of these ones of a picture of the first, so that what all pixels share is no more of the pilot's than
+    /// of the picture's.
+    pub pilot: fn(&Settings, [u32; 2], [u32; 2]) -> Result<Settings>,
     /// How its error falls, with these settings.
     pub law: fn(&Settings) -> Result<Law>,
 }
@@ -52,6 +55,7 @@ impl Foresight {
     pub const PLAIN: Self = Self {
         fits: |_, _| Ok(()),
         misses: |_, _, _| Ok(None),
+        pilot: |settings, _, _| Ok(settings.clone()),
         law: |_| Ok(Law::INDEPENDENT),
     };
 

@@ -34,6 +34,30 @@ macro_rules! surface_spec {
 }
 pub use surface_spec;
 
+/// Specialization of a kernel in which light leaves the lights (`transport/emission.glsl`) to those of a [`GpuScene`](crate::transport::GpuScene), as
+/// [`surface_spec!`].
+macro_rules! emission_spec {
+    ($shader:ident, $scene:expr, { $($further:tt)* }) => {{
+        let profile = $scene.profile();
+        $shader::Spec {
+            has_textures: profile.has_textures,
+            has_vertex_colors: profile.has_vertex_colors,
+            has_shading_normals: false,
+            has_normal_maps: false,
+            has_absorption: profile.has_absorption,
+            has_media: profile.media.any(),
+            has_unlit: false,
+            has_instances: profile.keeps_instances,
+            has_alpha: profile.has_alpha(),
+            has_environment: profile.has_environment(),
+            has_area_lights: $scene.has_area_lights(),
+            has_punctual_lights: $scene.has_punctual_lights(),
+            $($further)*
+        }
+    }};
+}
+pub(crate) use emission_spec;
+
 /// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
 /// is off where nothing else is known.
 pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 27] = [

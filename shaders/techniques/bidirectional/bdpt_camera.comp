@@ -130,18 +130,18 @@ void main() {
         if (before.pixel != SPLAT_STOPPED) {
             return;
         }
-        cursor = floatBitsToUint(before.radiance.x);
+        cursor = before.words.x;
     }
     uvec4 words = pcg4d(uvec4(index, push.pass, SPLAT_SEED, push.seed));
     uint pixel;
     Ray ray;
     vec3 radiance = splat(load_light_vertex(index), words, pixel, ray);
     if (cursor == INDEX_START) {
-        COUNT_WIDE(bdpt_counters.connections, pixel != SPLAT_NONE ? 1u : 0u)
+        COUNT_WIDE(bdpt_counters.in_view, pixel != SPLAT_NONE ? 1u : 0u)
         COUNT_WIDE(bdpt_counters.shadow_rays, radiance != vec3(0.0) ? 1u : 0u)
     }
     if (radiance == vec3(0.0)) {
-        light_splats[index] = LightSplat(vec3(0.0), SPLAT_NONE);
+        light_splats[index] = LightSplat(uvec3(0u), SPLAT_NONE);
         return;
     }
     if (HAS_ALPHA) {
@@ -150,12 +150,12 @@ void main() {
     Hit hit = no_hit(ray.t_max);
     cursor = any_hit(ray, cursor, hit);
     if (cursor != INDEX_FINISHED) {
-        light_splats[index] = LightSplat(vec3(uintBitsToFloat(cursor), 0.0, 0.0), SPLAT_STOPPED);
+        light_splats[index] = LightSplat(uvec3(cursor, 0u, 0u), SPLAT_STOPPED);
         atomicAdd(bdpt_counters.remaining, 1u);
         return;
     }
     bool open = hit.triangle == NO_HIT;
-    light_splats[index] = LightSplat(radiance, open ? pixel : SPLAT_NONE);
+    light_splats[index] = LightSplat(floatBitsToUint(radiance), open ? pixel : SPLAT_NONE);
     if (open) {
         // Bits of numbers that are not negative have their order.
         atomicMax(bdpt_counters.greatest_splat, floatBitsToUint(largest_component(radiance)));

@@ -5,13 +5,7 @@
 #ifndef CLERESTORY_TECHNIQUES_BIDIRECTIONAL_BDPT_LIGHTS_GLSL
 #define CLERESTORY_TECHNIQUES_BIDIRECTIONAL_BDPT_LIGHTS_GLSL
 
-#include "transport/light_choice.glsl"
-
-// Share of a lamp's walks that leave on the side of a point.
-float lamp_side_probability(SceneMaterial m) { return (m.flags & MATERIAL_DOUBLE_SIDED) != 0u ? 0.5 : 1.0; }
-
-// Density of the cosine of spots' cones, or of the sphere about points.
-float punctual_one_minus_cos(SceneLight light) { return light.kind == LIGHT_SPOT ? 1.0 - light.cos_outer : 2.0; }
+#include "transport/emission.glsl"
 
 // Density of a place by light sampling (1/m2), and of that place and a direction by walks (1/(m2 sr)), of a lamp that was met from `wo`.
 vec2 lamp_densities(Surface s, SceneMaterial m, vec3 wo) {
@@ -30,27 +24,12 @@ vec2 sky_densities(SceneEnvironment e, vec3 local, float disk_pdf) {
 LightSample sample_emission(vec3 from, uvec2 word, float disk_pdf, vec3 scene_lower, vec3 scene_upper, out float emitted) {
     uvec3 fresh = pcg3d(uvec3(word, 0u));
     LightChoice choice = choose_light_by_power(word, fresh.x);
-    LightSample result = no_light();
-    result.choice = choice;
+    LightPoint point;
+    LightSample result = sample_chosen_light(choice, from, word, fresh.yz, true, scene_lower, scene_upper, point);
     emitted = disk_pdf;
-    if (HAS_ENVIRONMENT && choice.light.kind == LIGHT_ENVIRONMENT) {
-        vec4 found;
-        SceneEnvironment e = load_environment();
-        vec3 local = environment_sample(environment_cdf_base(), environment_size(e), 0.0, true, word, fresh.yz, found);
-        result.direction = environment_to_world(e, local);
-        result.pdf = found.a * choice.probability;
-        result.radiance = result.pdf > 0.0 ? found.rgb / result.pdf : vec3(0.0);
-        result.infinite = true;
+    if (result.infinite) {
         return result;
     }
-    if (HAS_PUNCTUAL_LIGHTS && choice.light.kind == LIGHT_DIRECTIONAL) {
-        result.direction = -choice.light.direction;
-        result.radiance = choice.light.strength / choice.probability;
-        result.infinite = true;
-        return result;
-    }
-    LightPoint point = light_point(choice, word, scene_lower, scene_upper);
-    result = light_seen(point, from);
     vec3 way = point.point.position - from;
     float squared = dot(way, way);
     if (HAS_AREA_LIGHTS && choice.light.kind == LIGHT_TRIANGLE) {

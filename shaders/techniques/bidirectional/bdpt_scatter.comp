@@ -12,6 +12,7 @@ layout(local_size_x = 64) in;
 #include "techniques/bidirectional/bdpt_set.glsl"
 #include "walk/wave.glsl"
 #include "techniques/bidirectional/bdpt_both_ways.glsl"
+#include "transport/adjoint_ratio.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -73,7 +74,7 @@ bool scatter(uint slot, uint place, WalkState walk, inout uint flags) {
         }
         share = scattered.weight;
         if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
-            share *= abs(frame.wo.z * dot(wi, a.surface.geometric_normal)) / (cos_in * abs(scattered.wi.z));
+            share *= adjoint_ratio(frame.z, a.surface.geometric_normal, a.wo, wi);
         }
         weights = mis_scatter_delta(weights, cos_out, ratio);
     }

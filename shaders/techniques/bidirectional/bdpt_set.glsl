@@ -20,8 +20,10 @@ const uint STRATEGY_SPLATS = 4u;
 layout(constant_id = 50) const uint STRATEGY = STRATEGY_COMBINED;
 layout(constant_id = 51) const bool PARALLEL_CAMERA = false;  // orthographic
 
-// Quarters of a vertex: barycentric coordinates, triangle, group of its walk and scatterings before; power that arrives, W, as if its walk were the only one, and d_vcm; the way it
-// came, unit, and d_vc.
+// Quarters of a vertex:
+// - barycentric coordinates, triangle, group of its walk and scatterings before;
+// - power that arrives, W, as if its walk were the only one, and d_vcm;
+// - the way it came, unit, and d_vc.
 const uint LIGHT_VERTEX_QUARTERS = 3u;
 
 // Where a walk's group lies in the word of its number of scatterings.
@@ -43,8 +45,8 @@ const uint SPLAT_NONE = 0xFFFFFFFFu;
 const uint SPLAT_STOPPED = 0xFFFFFFFEu;
 
 struct LightSplat {
-    vec3 radiance;  // the first component holds where a ray goes on that has stopped
-    uint pixel;     // behind those of the groups before
+    uvec3 words;  // bits of its radiance; where its ray has stopped the first is where that goes on
+    uint pixel;   // behind those of the groups before
 };
 
 // Sums of a pixel in steps of splat_step, 64 bits a band, low word first.
@@ -66,7 +68,8 @@ layout(set = 3, binding = 3, scalar) restrict buffer ConnectionStates { Connecti
 layout(set = 3, binding = 4, scalar) restrict buffer BidirectionalCounters {
     uint remaining;        // places or vertices of a sweep whose shadow rays go on
     uint greatest_splat;   // bits of the greatest band of a splat
-    uint connections[2];   // 64 bits, low word first: pairs of vertices, and vertices that the camera might see
+    uint connections[2];   // 64 bits, low word first: pairs of vertices
+    uint in_view[2];       // vertices that the camera might see
     uint shadow_rays[2];   // those that might bring light
 } bdpt_counters;
 layout(set = 3, binding = 5, scalar) restrict buffer LightSplats { LightSplat light_splats[]; };  // by vertex

@@ -28,7 +28,7 @@ void main() {
     }
     float per_step = 1.0 / splat_step(bdpt_counters.greatest_splat);
     for (uint band = 0u; band < 3u; ++band) {
-        float value = splat.radiance[band] * per_step;
+        float value = uintBitsToFloat(splat.words[band]) * per_step;
         float steps = value < WHOLE ? floor(value + 0.5) : value;
         float high = floor(steps / LOW_RANGE);
         uint above = uint(high);

@@ -15,9 +15,9 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
-#include "techniques/photon_mapping/adjoint_ratio.glsl"
 #include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_wave.glsl"
+#include "transport/adjoint_ratio.glsl"
 #include "transport/arrival.glsl"
 #include "transport/bsdf_label.glsl"
 #include "transport/path_set.glsl"

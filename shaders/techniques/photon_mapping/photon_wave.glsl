@@ -11,10 +11,6 @@
 
 // descriptor set 3: PhotonWave
 
-// Slots of random numbers at emission: those for a walk's start.
-const uint PHOTON_DIMENSION_POINT = 0u;      // light, and point of it
-const uint PHOTON_DIMENSION_DIRECTION = 1u;  // side of the light, and direction
-
 // What has become of photons.
 layout(set = 3, binding = 0, scalar) restrict buffer PhotonCounters {
     uint escaped;         // left the scene

@@ -43,6 +43,37 @@ fn lamps_agree_with_the_path_tracer() {
     });
 }
 
+/// As they are by default, in which samples of a pixel are not independent, and with more connections: by means over pictures of other seeds.
+#[test]
+fn defaults_and_more_connections_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = room();
+        add_lamp(&mut scene, 3.0);
+        add_point(&mut scene, Vec3::new(0.3, 0.4, -0.1), 1.0);
+        let reference = traced(gpu, &scene, "bounces=1..", 4096).mean();
+        for connections in [1, 4] {
+            let settings = BidirectionalSettings {
+                least_bounces: 1,
+                connections,
+                ..BidirectionalSettings::default()
+            };
+            let mut renderer = renderer(gpu, &scene, SIZE, &settings);
+            let pictures: Vec<Vec<f32>> = (1..=BLOCKS)
+                .map(|seed| {
+                    renderer.restart(seed).expect("seed");
+                    let [radiance, _] = advance(&mut renderer, 16);
+                    radiance
+                })
+                .collect();
+            for (channel, (expected, variance)) in reference.into_iter().enumerate() {
+                let means: Vec<f64> = pictures.iter().map(|picture| mean(picture, channel)).collect();
+                let what = format!("{connections} connections, channel {channel}");
+                expect_mean_of(&what, &means, expected, variance.sqrt(), 0.0);
+            }
+        }
+    });
+}
+
 #[test]
 fn lights_without_area_and_skies_agree_with_the_path_tracer() {
     with_gpu(|gpu| {
@@ -132,5 +163,16 @@ fn materials_of_all_kinds_agree_with_the_path_tracer() {
             panes.place(cuboid(name, material, lower, lower + Vec3::new(0.25, 1.2, 0.05)));
         }
         expect_agreement(gpu, &panes, SAMPLES, 4096);
+    });
+}
+
+/// Light is absorbed on all ways through a body, also on the first one of a light that is inside.
+#[test]
+fn bodies_that_absorb_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = room();
+        scene.name = "tinted body".into();
+        add_lit_body(&mut scene, 2.0);
+        expect_agreement(gpu, &scene, SAMPLES, 4096);
     });
 }

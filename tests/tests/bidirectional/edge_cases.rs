@@ -4,6 +4,7 @@ use super::*;
 use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::techniques::PathTracerSettings;
+use clerestory::techniques::bidirectional::BidirectionalCounts;
 use clerestory_tests::child::hash_in_child;
 use clerestory_tests::gpu;
 use clerestory_tests::render::{camera_down, floor};
@@ -57,20 +58,26 @@ fn pictures_do_not_depend_on_how_the_work_is_cut_up() {
         let of = |settings: &BidirectionalSettings| {
             let mut renderer = renderer(gpu, &scene, [13, 7], settings);
             let picture = bits(&advance(&mut renderer, 6));
-            let counts = renderer.counts();
-            (picture, [counts.light_vertices, counts.connections, counts.shadow_rays])
+            (picture, renderer.counts())
         };
+        let done = |c: &BidirectionalCounts| [c.light_vertices, c.vertices_in_view, c.connections, c.shadow_rays];
         let (whole, counts) = of(&base);
-        assert!(counts.iter().all(|count| *count > 300), "{counts:?}");
-        for (paths_in_flight, submission_work) in [(64, 0), (0, 1), (64, 64)] {
+        assert!(done(&counts).iter().all(|count| *count > 300), "{counts:?}");
+        assert_eq!((counts.stalls, counts.postponed), (0, 0));
+        for (paths_in_flight, submission_work, ray_quota) in [(64, 0, 0), (0, 1, 0), (64, 64, 0), (0, 0, 3)] {
             let settings = BidirectionalSettings {
                 paths_in_flight,
                 submission_work,
+                ray_quota,
                 ..base.clone()
             };
-            let (parted, parted_counts) = of(&settings);
-            assert_eq!(parted, whole, "{paths_in_flight} {submission_work}");
-            assert_eq!(parted_counts, counts, "{paths_in_flight} {submission_work}");
+            let what = format!("{paths_in_flight} {submission_work} {ray_quota}");
+            let (parted, of_parted) = of(&settings);
+            assert_eq!(parted, whole, "{what}");
+            assert_eq!(done(&of_parted), done(&counts), "{what}");
+            assert_eq!(paths_in_flight > 0, of_parted.waves > counts.waves, "{what}");
+            assert_eq!(submission_work > 0, of_parted.postponed > 0, "{what}");
+            assert_eq!(ray_quota > 0, of_parted.stalls > 0, "{what}");
         }
         let again = BidirectionalSettings {
             seed: 12,
@@ -87,6 +94,32 @@ fn pictures_do_not_depend_on_how_the_work_is_cut_up() {
             advance(&mut renderer, samples);
         }
         assert_eq!(bits(&advance(&mut renderer, 6)), whole);
+    });
+}
+
+/// Walks that leave more vertices than there is room for at first are walked again.
+#[test]
+fn vertices_beyond_what_there_is_room_for_are_not_lost() {
+    with_gpu(|gpu| {
+        let scene = builtin("builtin:furnace-box?rho=0.95");
+        let settings = BidirectionalSettings {
+            light_paths: 64,
+            ..settings()
+        };
+        let mut renderer = renderer(gpu, &scene, SIZE, &settings);
+        let first = bits(&advance(&mut renderer, 2));
+        let counts = renderer.counts();
+        // Room at first, a walk.
+        assert!(counts.light_vertices > 6 * counts.light_paths, "{counts:?}");
+        // The second time there is room from the start.
+        renderer.restart(settings.seed).expect("seed");
+        assert_eq!(bits(&advance(&mut renderer, 2)), first);
+        let again = renderer.counts();
+        assert_eq!(again.light_vertices, 2 * counts.light_vertices);
+        assert!(
+            again.light_rays - counts.light_rays < counts.light_rays,
+            "{counts:?} {again:?}"
+        );
     });
 }
 

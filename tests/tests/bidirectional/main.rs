@@ -1,8 +1,8 @@
 //! Bidirectional path tracing against the path tracer on equal path sets, each of its strategies alone, and equal bits however the work is done.
 //!
-//! Passes are independent of each other (PCG), so the film's variance is that of each pixel's mean, and pixels are tested one by one by the z-test with Šidák's
-//! correction, of which correlation between pixels makes false alarms rarer, not more frequent. Pixels of a pass share its light subpaths: means over the picture are tested by Student's t
-//! over blocks of passes.
+//! Passes are independent of each other (PCG). The samples of one share thousands of light vertices, of which each draws its own: what the film's variance lacks by that is far below it, so that pixels are
+//! tested one by one by the z-test with Šidák's correction, of which correlation between pixels makes false alarms rarer, not more frequent. Pixels of a pass share its light
+//! subpaths, too: means over the picture are tested by Student's t over blocks of passes.
 
 mod agreement;
 mod edge_cases;
@@ -13,7 +13,7 @@ use clerestory::gpu::Gpu;
 use clerestory::scene::{LightKind, Material, Scene};
 use clerestory::techniques::bidirectional::{BidirectionalPaths, BidirectionalSettings, Strategies};
 use clerestory::transport::random::SamplerKind;
-use clerestory_tests::render::{Rendered, advance, builtin, cuboid, lamp, mean, paths, render, upload};
+use clerestory_tests::render::{Rendered, add_lit_body, advance, builtin, cuboid, lamp, mean, paths, render, upload};
 use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::{DAffine3, DVec3, Vec3};

@@ -118,3 +118,16 @@ fn materials_of_all_kinds_agree_with_the_path_tracer() {
         }
     });
 }
+
+/// Walks are absorbed on all ways through a body, also on the first one from a light that is inside.
+#[test]
+fn bodies_that_absorb_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = room();
+        scene.name = "tinted body".into();
+        scene.lights.clear();
+        add_lit_body(&mut scene, 2.0);
+        let found = passes(gpu, &scene, &several(), 48);
+        found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
+    });
+}

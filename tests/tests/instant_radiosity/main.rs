@@ -19,7 +19,7 @@ use clerestory::scene::{LightKind, Material, Scene};
 use clerestory::techniques::Technique;
 use clerestory::techniques::instant_radiosity::{Bound, Compensation, PassCounts, VirtualLightSettings, VirtualLights};
 use clerestory::transport::random::SamplerKind;
-use clerestory_tests::render::{Rendered, advance, builtin, cuboid, mean, paths, render, upload};
+use clerestory_tests::render::{Rendered, add_lit_body, advance, builtin, cuboid, mean, paths, render, upload};
 use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::Vec3;

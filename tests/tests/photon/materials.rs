@@ -246,3 +246,22 @@ fn light_goes_through_what_lets_it_through() {
         }
     });
 }
+
+/// A lamp in two bands, a point light in the third: all that they light is in the body with them.
+#[test]
+fn lights_inside_a_body_that_absorbs_shine_through_it() {
+    with_gpu(|gpu| {
+        let mut scene = fixture("body of ink", plain("floor"), plain("wall"));
+        let lamps = scene.materials.iter_mut().filter(|m| m.emission != Vec3::ZERO);
+        lamps.for_each(|lamp| lamp.emission.y = 0.0);
+        add_point(&mut scene, Vec3::new(0.2, 1.0, -0.3), Vec3::Y * 20.0);
+        let index = scene.add_material(ink());
+        scene.place(cuboid(
+            "body",
+            index,
+            Vec3::new(-2.2, -0.1, -2.2),
+            Vec3::new(2.2, 2.0, 2.2),
+        ));
+        expect_material(gpu, &scene);
+    });
+}

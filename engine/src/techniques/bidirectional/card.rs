@@ -43,6 +43,10 @@ pub(in crate::techniques) const CARD: Card = Card {
             })
         },
         fits: |caps, size| sums_within(caps, size).map(|_| ()),
+        pilot: |settings, picture, pilot| {
+            let settings: BidirectionalSettings = settings.read()?;
+            Ok(settings.of_pilot(picture, pilot).into())
+        },
     },
     create: |gpu, scene, view, settings| {
         let mut settings: BidirectionalSettings = settings.read()?;
@@ -135,7 +139,7 @@ const ROWS: &[Row] = &[
         id: "CL-BDPT",
         name: "technique `bdpt`: bidirectional path tracing on surfaces, all ways to make a path weighted by the balance heuristic",
         role: Role::Technique,
-        limits: "Refuses scenes with media; chooses among many lights by power alone; mirrors are joined to nothing, so that light seen in a mirror by way of another from a lamp without area is not found; each sample has light subpaths of its own, which costs where light arrives directly.",
+        limits: "Refuses scenes with media; chooses among many lights by power alone; mirrors and smooth glass are joined to nothing, so that light of sources without area is missing that a mirror or smooth glass throws onto what is seen in another; a light subpath for each pixel and sample up to 65,536 a pass, of which large pictures have less; each sample has light subpaths of its own, which costs where light arrives directly.",
         sources: &[
             sources::LAFORTUNE_WILLEMS_1993.whole(),
             sources::VEACH_1997.at("chapters 9 and 10"),
@@ -153,9 +157,12 @@ const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/bidirectional/agreement.rs::lights_in_a_lambert_sphere_fill_it_evenly",
             "tests/tests/bidirectional/agreement.rs::lamps_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/agreement.rs::defaults_and_more_connections_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::lights_without_area_and_skies_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/agreement.rs::bodies_that_absorb_agree_with_the_path_tracer",
             "tests/tests/bidirectional/edge_cases.rs::pictures_do_not_depend_on_how_the_work_is_cut_up",
+            "tests/tests/bidirectional/edge_cases.rs::vertices_beyond_what_there_is_room_for_are_not_lost",
             "tests/tests/bidirectional/edge_cases.rs::scenes_without_lights_or_reflection_have_nothing_to_join",
             "tests/tests/bidirectional/edge_cases.rs::what_cannot_be_modelled_is_refused_by_name",
         ],

@@ -45,7 +45,7 @@ impl Connect {
             parallel_camera: is_parallel,
             strategy: settings.strategies.kind(),
             connections: settings.connections,
-            index_quota: quota_of(gpu, scene, settings.connections)?,
+            index_quota: quota_of(gpu, scene, settings, settings.connections)?,
             index_kind: traversal.kind(),
             ..Default::default()
         });

@@ -62,14 +62,14 @@ impl EyeWave {
 }
 
 impl Cursor {
-    /// The next wave of at most `slots` paths towards `wanted` samples per pixel, of which a pass has `each`; and where the one after it begins.
-    pub fn next_wave(&self, film: &GpuFilm, slots: u32, each: u32, wanted: u32) -> (EyeWave, Self) {
+    /// The next wave of at most `slots` paths towards `wanted` samples per pixel, of which a pass has `samples_per_pass`; and where the one after it begins.
+    pub fn next_wave(&self, film: &GpuFilm, slots: u32, samples_per_pass: u32, wanted: u32) -> (EyeWave, Self) {
         let mut c = *self;
         let bands = film.bands();
         let band = &bands[c.band];
         if c.band == 0 && c.in_band == 0 {
             let left = wanted.saturating_sub(c.sample);
-            c.samples = (each - c.sample % each).min(left).clamp(1, slots);
+            c.samples = (samples_per_pass - c.sample % samples_per_pass).min(left).clamp(1, slots);
         }
         let pixels = (band.pixels() - c.in_band).min(slots / c.samples);
         let wave = EyeWave {
@@ -138,7 +138,7 @@ impl EyeMemory {
             .max(1)
             .next_multiple_of(WALK_GROUP)
             .min(slots_of_device(gpu));
-        let connects = settings.has_light_paths() && settings.strategies.connects();
+        let connects = settings.joins();
         WaveBuffers::within_memory(gpu, slots, needs, |slots| {
             Self::new(gpu, slots, settings.aovs, connects)
         })
@@ -386,8 +386,8 @@ pub(super) fn record_resolve(
     wave: &EyeWave,
 ) -> Result<()> {
     let walks = buffers.set(0);
-    if let Some((lights, of_pass)) = lights {
-        lights.record_add(recorder, &walks, wave, of_pass)?;
+    if let Some((lights, sample_in_pass)) = lights {
+        lights.record_add(recorder, &walks, wave, sample_in_pass)?;
     }
     let band = &film.bands()[wave.band];
     let push = path_resolve::Push {

@@ -1,11 +1,11 @@
 //! What the kernels of bidirectional paths have in common on the host: quotas of their rays, the set that they share, and sweeps over what a quota has stopped.
 
+use super::settings::BidirectionalSettings;
 use crate::gpu::shaders::constants::INSTANCE_SEARCH_STEPS;
 use crate::gpu::shaders::sets::BidirectionalSet;
 use crate::gpu::shaders::techniques::bidirectional::bdpt_camera;
 use crate::gpu::{Buffer, BufferDesc, Category, DeviceKind, Gpu, SOFTWARE_LOOP_CAP, TexelView};
 use crate::transport::GpuScene;
-use crate::walk::RAY_QUOTA;
 use crate::{Error, Result};
 
 /// What kernels count.
@@ -25,12 +25,12 @@ const DEVICE_RAYS: u32 = 1 << 24;
 ///
 /// # Errors
 /// [`Error::LimitExceeded`] where a leaf of the scene's index alone takes too many.
-pub(super) fn quota_of(gpu: &Gpu, scene: &GpuScene, rays: u32) -> Result<u32> {
+pub(super) fn quota_of(gpu: &Gpu, scene: &GpuScene, settings: &BidirectionalSettings, rays: u32) -> Result<u32> {
     let filters = scene.profile().has_alpha();
     let searches = if scene.profile().keeps_instances { SEARCHES } else { 0 };
     let each = (SOFTWARE_LOOP_CAP / rays.max(1)).saturating_sub(CONNECTION_ITERATIONS + searches);
     let lanes = if filters { gpu.caps().subgroup_size.max(1) } else { 1 };
-    let quota = RAY_QUOTA.min(each / lanes);
+    let quota = settings.quota().min(each / lanes);
     scene.index_traversal().quota_within(gpu.caps(), quota, each, filters)
 }
 
@@ -82,7 +82,7 @@ impl Counts {
     }
 }
 
-/// The set for kernels that use nothing of it but what is put in place of it: some other buffers stand there.
+/// The set with `other` in every place but that of the vertices, for whoever puts in place of it what its kernels use.
 pub(super) fn set_of<'a>(vertices: &'a TexelView, other: &'a Buffer) -> BidirectionalSet<'a> {
     BidirectionalSet {
         light_vertex_texels: vertices,

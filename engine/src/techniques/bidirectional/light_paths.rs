@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::eye::EyeWave;
 use super::kernels::{Counters, Counts, check_sweeps, rays_of_submission, set_of, work};
 use super::settings::BidirectionalSettings;
-use super::splats::{Shown, ShownWalks, camera_pipeline, splats};
+use super::splats::{CameraSplats, ShownWalks, camera_pipeline, splats, vertices_within};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{LIGHT_VERTEX_QUARTERS, WALK_GROUP};
@@ -19,6 +19,7 @@ use crate::gpu::{
     Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
 };
 use crate::scene::camera_frame::CameraFrame;
+use crate::transport::surface_spec::emission_spec;
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds, slots_of_device,
@@ -32,8 +33,6 @@ const BOUNCES_PER_SUBMISSION: usize = 8;
 const VERTICES_PER_WALK: u32 = 6;
 /// Tells the random numbers of light subpaths from those of eye paths.
 const LIGHT_SEED: u32 = 0x6c69_6768;
-/// Sums are the same bits for up to as many splats.
-const SPLATS_MAX: u64 = 1 << 22;
 
 /// Light subpaths of a pass, as far as they are.
 #[expect(clippy::large_enum_variant, reason = "there is one for each renderer")]
@@ -66,16 +65,16 @@ pub(super) struct LightCounts {
 pub(super) struct LightPaths {
     gpu: Gpu,
     walker: Walker,
-    kit: Kit,
-    camera: Option<Shown>,
+    walks: LightWalks,
+    camera: Option<CameraSplats>,
     phase: Phase,
     vertices: u32,
     rays_at_once: u32,
     counts: LightCounts,
 }
 
-/// All of it but its walker.
-struct Kit {
+/// What walks from the lights are made of, but for the walker.
+struct LightWalks {
     scene: Arc<GpuScene>,
     emit: ComputePipeline<bdpt_emit::Kernel>,
     scatter: ComputePipeline<bdpt_scatter::Kernel>,
@@ -87,7 +86,7 @@ struct Kit {
     vertices: TexelView,
     capacity: u32,
     /// Of a pass.
-    walks: u32,
+    count: u32,
     /// Of each group: light subpaths for one sample of all pixels.
     group: u32,
     seed: u32,
@@ -95,7 +94,7 @@ struct Kit {
 }
 
 struct LightStages<'a> {
-    kit: &'a Kit,
+    walks: &'a LightWalks,
     key: WalkKey,
 }
 
@@ -107,21 +106,10 @@ impl LightPaths {
         size: [u32; 2],
         settings: &BidirectionalSettings,
     ) -> Result<Self> {
-        let profile = scene.profile();
-        let emit = bdpt_emit::Spec {
-            has_textures: profile.has_textures,
-            has_vertex_colors: profile.has_vertex_colors,
-            has_shading_normals: false,
-            has_normal_maps: false,
-            has_unlit: false,
-            has_instances: profile.keeps_instances,
-            has_alpha: profile.has_alpha(),
-            has_environment: profile.has_environment(),
-            has_area_lights: scene.has_area_lights(),
-            has_punctual_lights: scene.has_punctual_lights(),
+        let emit = emission_spec!(bdpt_emit, scene, {
             sampler_kind: settings.sampler as u32,
             ..Default::default()
-        };
+        });
         let scatter = surface_spec!(bdpt_scatter, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
             separable_masking: false,
@@ -130,8 +118,8 @@ impl LightPaths {
         });
         let [samples, group] = settings.pass_of(size[0] * size[1]);
         let group = group.min(slots_of_device(gpu) / samples);
-        let walks = samples * group;
-        let slots = walks.next_multiple_of(WALK_GROUP).min(slots_of_device(gpu));
+        let count = samples * group;
+        let slots = count.next_multiple_of(WALK_GROUP).min(slots_of_device(gpu));
         let needs = WaveNeeds {
             waiting: true,
             media: false,
@@ -140,16 +128,17 @@ impl LightPaths {
         let options = WalkOptions {
             name: "light subpaths",
             shadows: false,
+            ray_quota: settings.quota(),
             bounces: BOUNCES_PER_SUBMISSION,
             work: settings.submission_work,
             ..WalkOptions::default()
         };
-        let capacity = u64::from(walks) * u64::from(VERTICES_PER_WALK);
-        let capacity = capacity.min(vertices_of_device(gpu)) as u32;
+        let capacity = u64::from(count) * u64::from(VERTICES_PER_WALK);
+        let capacity = capacity.min(vertices_within(gpu.caps())) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
         let mut paths = Self {
             walker: Walker::new(gpu, Arc::clone(scene), buffers, options)?,
-            kit: Kit {
+            walks: LightWalks {
                 emit: gpu.compute_pipeline(&emit)?,
                 scatter: gpu.compute_pipeline(&scatter)?,
                 append: gpu.compute_pipeline(&Default::default())?,
@@ -159,7 +148,7 @@ impl LightPaths {
                 vertices: vertex_texels(gpu, capacity)?,
                 capacity,
                 scene: Arc::clone(scene),
-                walks,
+                count,
                 group,
                 seed: settings.seed,
                 last_bounce: settings.walk_bounces(),
@@ -172,14 +161,14 @@ impl LightPaths {
             counts: LightCounts::default(),
         };
         if settings.strategies.splats() {
-            paths.camera = Some(Shown::new(gpu, scene, frame, size, settings, capacity)?);
+            paths.camera = Some(CameraSplats::new(gpu, scene, frame, size, settings, capacity)?);
         }
         Ok(paths)
     }
 
     /// Light subpaths of a pass, and for each of its samples.
     pub fn walks(&self) -> [u32; 2] {
-        [self.kit.walks, self.kit.group]
+        [self.walks.count, self.walks.group]
     }
 
     /// Whether they meet the camera.
@@ -189,7 +178,7 @@ impl LightPaths {
 
     /// The vertices of the pass, and how many there are.
     pub fn vertices(&self) -> (&TexelView, u32) {
-        (&self.kit.vertices, self.vertices)
+        (&self.walks.vertices, self.vertices)
     }
 
     /// Whether all of the pass is there.
@@ -205,13 +194,13 @@ impl LightPaths {
 
     /// Goes on with another seed.
     pub fn set_seed(&mut self, seed: u32) {
-        self.kit.seed = seed;
+        self.walks.seed = seed;
     }
 
     /// Looks through another camera.
     pub fn set_camera(&mut self, frame: &CameraFrame, settings: &BidirectionalSettings) -> Result<()> {
         if let Some(camera) = &mut self.camera {
-            camera.pipeline = camera_pipeline(&self.gpu, &self.kit.scene, frame, settings)?;
+            camera.pipeline = camera_pipeline(&self.gpu, &self.walks.scene, frame, settings)?;
             camera.frame = *frame;
         }
         Ok(())
@@ -222,8 +211,8 @@ impl LightPaths {
     }
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        let kit = &self.kit;
-        let mut all = vec![kit.emit.info(), kit.scatter.info(), kit.append.info()];
+        let walks = &self.walks;
+        let mut all = vec![walks.emit.info(), walks.scatter.info(), walks.append.info()];
         all.extend(self.walker.trace_pipelines());
         if let Some(camera) = &self.camera {
             all.extend([camera.pipeline.info(), camera.splat.info(), camera.add.info()]);
@@ -239,7 +228,7 @@ impl LightPaths {
         let phase = std::mem::replace(&mut self.phase, Phase::Before);
         match phase {
             Phase::Before => {
-                let wave = self.walker.begin(self.key(pass), self.kit.walks)?;
+                let wave = self.walker.begin(self.key(pass), self.walks.count)?;
                 self.walk(pass, wave)
             }
             Phase::Walking(wave) => self.walk(pass, wave),
@@ -255,14 +244,14 @@ impl LightPaths {
         WalkKey {
             first_sequence: pass,
             first_index: 0,
-            indices: self.kit.walks,
-            seed: self.kit.seed ^ LIGHT_SEED,
+            indices: self.walks.count,
+            seed: self.walks.seed ^ LIGHT_SEED,
         }
     }
 
     fn walk(&mut self, pass: u32, mut wave: WaveInFlight) -> Result<Vec<Timings>> {
         let mut stages = LightStages {
-            kit: &self.kit,
+            walks: &self.walks,
             key: self.key(pass),
         };
         self.walker.advance(&mut wave, &mut stages)?;
@@ -272,7 +261,7 @@ impl LightPaths {
             return Ok(timings);
         }
         let walked = wave.walked();
-        let (needed, most) = (walked.waited, vertices_of_device(&self.gpu));
+        let (needed, most) = (walked.waited, vertices_within(self.gpu.caps()));
         if needed > most {
             return Err(Error::Overflow {
                 kernel: "bdpt_append".into(),
@@ -285,7 +274,7 @@ impl LightPaths {
         self.counts.rays += walked.rays;
         self.counts.stalls += walked.stalls;
         self.counts.postponed += walked.postponed;
-        if needed > u64::from(self.kit.capacity) {
+        if needed > u64::from(self.walks.capacity) {
             // The pass is walked again, with room for all.
             let capacity = (needed + needed / 4).min(most) as u32;
             // First what can fail: vertices and what is shown of them have the same room.
@@ -293,11 +282,11 @@ impl LightPaths {
             if let Some(camera) = &mut self.camera {
                 camera.splats = splats(&self.gpu, capacity)?;
             }
-            (self.kit.vertices, self.kit.capacity) = (vertices, capacity);
+            (self.walks.vertices, self.walks.capacity) = (vertices, capacity);
             return Ok(timings);
         }
         self.vertices = needed as u32;
-        self.counts.walks += u64::from(self.kit.walks);
+        self.counts.walks += u64::from(self.walks.count);
         self.counts.vertices += needed;
         self.phase = match self.camera {
             Some(_) => Phase::Showing { shown: 0, sweeps: 0 },
@@ -315,19 +304,19 @@ impl LightPaths {
         let end = shown.saturating_add(self.rays_at_once).min(self.vertices);
         let walks = ShownWalks {
             pass,
-            group: self.kit.group,
-            seed: self.kit.seed,
+            group: self.walks.group,
+            seed: self.walks.seed,
         };
-        let (set, scene) = (camera.set(self.kit.set()), &self.kit.scene);
+        let (set, scene) = (camera.set(self.walks.set()), &self.walks.scene);
         let push = camera.push(scene, walks, [shown, end], sweeps > 0);
         let mut recorder = self.gpu.recorder("bidirectional splats")?;
         recorder.pass("light subpaths: to the camera", |p| {
             if shown == 0 && sweeps == 0 {
                 p.fill(camera.sums.view(), 0)?;
-                p.fill(self.kit.counts.device.view(), 0)?;
+                p.fill(self.walks.counts.device.view(), 0)?;
             } else {
                 let offset = std::mem::offset_of!(Counters, remaining) as u64;
-                p.fill(self.kit.counts.device.slice(offset, size_of::<u32>() as u64), 0)?;
+                p.fill(self.walks.counts.device.slice(offset, size_of::<u32>() as u64), 0)?;
             }
             p.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             if end > shown {
@@ -336,10 +325,10 @@ impl LightPaths {
                 p.dispatch(&camera.pipeline, &[&index, &scene, &set], &push, groups)?;
             }
             p.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
-            p.copy(self.kit.counts.device.view(), self.kit.counts.readback.view())
+            p.copy(self.walks.counts.device.view(), self.walks.counts.readback.view())
         })?;
         let mut timings = vec![recorder.submit()?.wait()?];
-        let counters = self.kit.counts.read()?;
+        let counters = self.walks.counts.read()?;
         if counters.remaining > 0 {
             check_sweeps("bdpt_camera", sweeps + 1)?;
             self.phase = Phase::Showing {
@@ -352,7 +341,7 @@ impl LightPaths {
             self.phase = Phase::Showing { shown: end, sweeps: 0 };
             return Ok(timings);
         }
-        self.counts.in_view += wide_counter(counters.connections);
+        self.counts.in_view += wide_counter(counters.in_view);
         self.counts.shadow_rays += wide_counter(counters.shadow_rays);
         if self.vertices > 0 {
             timings.push(self.sum(camera)?);
@@ -361,8 +350,8 @@ impl LightPaths {
         Ok(timings)
     }
 
-    fn sum(&self, camera: &Shown) -> Result<Timings> {
-        let set = camera.set(self.kit.set());
+    fn sum(&self, camera: &CameraSplats) -> Result<Timings> {
+        let set = camera.set(self.walks.set());
         let mut recorder = self.gpu.recorder("bidirectional splats")?;
         recorder.pass("light subpaths: sum", |pass| {
             let push = bdpt_splat::Push { count: self.vertices };
@@ -388,7 +377,7 @@ impl LightPaths {
         let Some(camera) = &self.camera else {
             return Ok(());
         };
-        let set = camera.set(self.kit.set());
+        let set = camera.set(self.walks.set());
         recorder.pass("light subpaths: add", |pass| {
             let push = bdpt_add::Push {
                 first_pixel: wave.first_pixel,
@@ -405,7 +394,7 @@ impl LightPaths {
     }
 }
 
-impl Kit {
+impl LightWalks {
     fn set(&self) -> BidirectionalSet<'_> {
         BidirectionalSet {
             subpath_weights: self.weights.view(),
@@ -418,8 +407,8 @@ impl Kit {
 impl WalkStages for LightStages<'_> {
     /// Walks leave the lights.
     fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
-        let kit = self.kit;
-        let [lower, upper] = kit.scene.bounds();
+        let walks = self.walks;
+        let [lower, upper] = walks.scene.bounds();
         let push = bdpt_emit::Push {
             scene_lower: lower.to_array(),
             radius: 0.5 * (upper - lower).length(),
@@ -427,28 +416,28 @@ impl WalkStages for LightStages<'_> {
             key: self.key,
         };
         recorder.pass("light subpaths: emit", |pass| {
-            let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
-            let (scene, own) = (kit.scene.emission_set(kit.emission.as_ref()), kit.set());
-            pass.dispatch(&kit.emit, &[wave, &scene, &own], &push, groups)?;
+            let groups = [walks.emit.groups_for(self.key.indices), 1, 1];
+            let (scene, own) = (walks.scene.emission_set(walks.emission.as_ref()), walks.set());
+            pass.dispatch(&walks.emit, &[wave, &scene, &own], &push, groups)?;
             stage_barrier(pass);
             Ok(())
         })
     }
 
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
-        let kit = self.kit;
-        let [lower, upper] = kit.scene.bounds();
+        let walks = self.walks;
+        let [lower, upper] = walks.scene.bounds();
         let push = bdpt_scatter::Push {
             scene_lower: lower.to_array(),
-            last_bounce: kit.last_bounce,
+            last_bounce: walks.last_bounce,
             scene_upper: upper.to_array(),
-            group: kit.group,
+            group: walks.group,
             key: self.key,
         };
         recorder.pass("light subpaths: scatter", |pass| {
-            let (scene, own) = (kit.scene.scene_set(), kit.set());
+            let (scene, own) = (walks.scene.scene_set(), walks.set());
             let sets: [&dyn BindingSet<'_>; 3] = [&bounce.wave, &scene, &own];
-            pass.dispatch_indirect(&kit.scatter, &sets, &push, bounce.places.items)?;
+            pass.dispatch_indirect(&walks.scatter, &sets, &push, bounce.places.items)?;
             stage_barrier(pass);
             Ok(())
         })
@@ -456,22 +445,15 @@ impl WalkStages for LightStages<'_> {
 
     /// What waits becomes vertices.
     fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
-        let kit = self.kit;
+        let walks = self.walks;
         recorder.pass("light subpaths: append", |pass| {
-            let push = bdpt_append::Push { capacity: kit.capacity };
-            let own = kit.set();
-            pass.dispatch_indirect(&kit.append, &[&bounce.wave, &own], &push, bounce.places.waiting)?;
+            let push = bdpt_append::Push { capacity: walks.capacity };
+            let own = walks.set();
+            pass.dispatch_indirect(&walks.append, &[&bounce.wave, &own], &push, bounce.places.waiting)?;
             stage_barrier(pass);
             Ok(())
         })
     }
-}
-
-/// Vertices that a buffer of the device can hold, and sums can add.
-fn vertices_of_device(gpu: &Gpu) -> u64 {
-    let caps = gpu.caps();
-    let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
-    (quarters / u64::from(LIGHT_VERTEX_QUARTERS)).min(SPLATS_MAX)
 }
 
 fn vertex_texels(gpu: &Gpu, vertices: u32) -> Result<TexelView> {

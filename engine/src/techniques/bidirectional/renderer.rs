@@ -1,4 +1,4 @@
-//! A progressive rendering by bidirectional path tracing: pass after pass, light subpaths of their own for each, and some eye paths a pixel, joined to them.
+//! A progressive rendering by bidirectional path tracing: pass after pass, light subpaths of their own for samples_per_pass, and some eye paths a pixel, joined to them.
 //!
 //! Sources: E. Lafortune, Y. Willems, "Bi-directional Path Tracing", 1993; E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", PhD thesis, 1997, chapters 9
 //! and 10; I. Georgiev, "Implementing Vertex Connection and Merging", 2012, for the partial weights; T. Davidovič, J. Křivánek, M. Hašan, P. Slusallek, "Progressive Light
@@ -69,7 +69,7 @@ pub struct BidirectionalPaths {
     lights: Option<LightPaths>,
     film: GpuFilm,
     /// Samples of a pass, or of a wave where there are no light subpaths.
-    each: u32,
+    samples_per_pass: u32,
     cursor: Cursor,
     in_flight: Option<InFlight>,
     counts: BidirectionalCounts,
@@ -109,18 +109,19 @@ impl BidirectionalPaths {
         let has_light_paths = scene.has_lights() && scene.light_power() > 0.0 && settings.has_light_paths();
         let lights = has_light_paths.then(|| LightPaths::new(gpu, &scene, &frame, size, &settings));
         let lights = lights.transpose()?;
-        let connects = lights.is_some() && settings.strategies.connects();
+        let connects = lights.is_some() && settings.joins();
         let pixels = size[0] * size[1];
-        let each = match lights {
+        let samples_per_pass = match lights {
             Some(_) => settings.pass_of(pixels)[0],
             None => SAMPLES_PER_WAVE,
         };
         let kernels = EyeKernels::new(gpu, &scene, &frame, &settings, connects)?;
         // Takes as much memory as is left, if it must.
-        let (buffers, memory) = EyeMemory::within(gpu, &scene, pixels.saturating_mul(each), &settings)?;
+        let (buffers, memory) = EyeMemory::within(gpu, &scene, pixels.saturating_mul(samples_per_pass), &settings)?;
         let options = WalkOptions {
             name: "bidirectional",
             shadows: scene.has_lights(),
+            ray_quota: settings.quota(),
             work: settings.submission_work,
             ..WalkOptions::default()
         };
@@ -135,7 +136,7 @@ impl BidirectionalPaths {
             memory,
             lights,
             film,
-            each,
+            samples_per_pass,
             cursor: Cursor::default(),
             in_flight: None,
             counts: BidirectionalCounts::default(),
@@ -198,7 +199,7 @@ impl BidirectionalPaths {
     /// [`Error::Setting`] for a camera that cannot be used, with which nothing changes; [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         let frame = CameraFrame::new(camera, self.film.size())?;
-        let connects = self.lights.is_some() && self.settings.strategies.connects();
+        let connects = self.lights.is_some() && self.settings.joins();
         let kernels = EyeKernels::new(&self.gpu, &self.scene, &frame, &self.settings, connects)?;
         self.film.clear()?;
         if let Some(lights) = &mut self.lights {
@@ -244,7 +245,7 @@ impl BidirectionalPaths {
         if let Some(lights) = &mut self.lights
             && !lights.are_ready()
         {
-            let timings = lights.advance(self.cursor.sample / self.each)?;
+            let timings = lights.advance(self.cursor.sample / self.samples_per_pass)?;
             return Ok(Some(self.step_so_far(timings, samples)));
         }
         let timings = self.advance(samples)?;
@@ -267,7 +268,7 @@ impl BidirectionalPaths {
             Some(in_flight) => in_flight,
             None => {
                 let slots = self.walker.buffers().slots();
-                let (wave, next) = self.cursor.next_wave(&self.film, slots, self.each, wanted);
+                let (wave, next) = self.cursor.next_wave(&self.film, slots, self.samples_per_pass, wanted);
                 let walks = self.walker.begin(wave.key(self.settings.seed), wave.paths())?;
                 InFlight { wave, next, walks }
             }
@@ -293,15 +294,15 @@ impl BidirectionalPaths {
         let (wave, next) = (*wave, *next);
         self.counts.paths += u64::from(wave.paths());
         self.counts.waves += 1;
-        if self.lights.as_ref().is_some_and(|lights| lights.vertices().1 > 0) && self.settings.strategies.connects() {
+        if self.lights.as_ref().is_some_and(|lights| lights.vertices().1 > 0) && self.settings.joins() {
             let counters = self.memory.counts.read()?;
             self.counts.connections += wide_counter(counters.connections);
             self.counts.shadow_rays += wide_counter(counters.shadow_rays);
         }
         let mut recorder = self.gpu.recorder("bidirectional film")?;
         let buffers = self.walker.buffers();
-        let of_pass = wave.first_sample % self.each;
-        let lights = self.lights.as_ref().map(|lights| (lights, of_pass));
+        let sample_in_pass = wave.first_sample % self.samples_per_pass;
+        let lights = self.lights.as_ref().map(|lights| (lights, sample_in_pass));
         record_resolve(
             &mut recorder,
             &self.kernels,
@@ -312,7 +313,7 @@ impl BidirectionalPaths {
             &wave,
         )?;
         let submission = recorder.submit()?;
-        let ends_pass = next.sample > self.cursor.sample && next.sample.is_multiple_of(self.each);
+        let ends_pass = next.sample > self.cursor.sample && next.sample.is_multiple_of(self.samples_per_pass);
         self.cursor = next;
         if let Some(lights) = &mut self.lights
             && ends_pass

@@ -1,6 +1,6 @@
 //! Settings of bidirectional path tracing.
 
-use super::splats::sums_within;
+use super::splats::{sums_within, vertices_within};
 use crate::gpu::Caps;
 use crate::gpu::shaders::constants::{
     STRATEGY_COMBINED, STRATEGY_CONNECTIONS, STRATEGY_EMISSION, STRATEGY_LIGHT_SAMPLES, STRATEGY_SPLATS,
@@ -9,6 +9,7 @@ use crate::settings::AboveTo;
 use crate::transport::PathSet;
 use crate::transport::path_set::PATH_SET_LOBES;
 use crate::transport::random::SamplerKind;
+use crate::walk::RAY_QUOTA;
 use crate::{Error, Result};
 
 /// Light subpaths of a pass, at most: their vertices then stay within the buffers of the baseline even where nothing absorbs.
@@ -17,6 +18,9 @@ pub(super) const LIGHT_PATHS_MAX: u32 = 1 << 16;
 const SAMPLES_AT_ONCE_MAX: u32 = 16;
 /// And as many as are chosen: light subpaths of a pass are walked for all of its samples, whether or not a picture takes them.
 const SAMPLES_AT_ONCE: u32 = 8;
+/// Vertices that a light subpath leaves on average, at most: each of the first [`CAPPED_BOUNCE`](crate::gpu::shaders::constants::CAPPED_BOUNCE) bounces, and one in
+/// 1 - [`SURVIVAL_MAX`](crate::gpu::shaders::constants::SURVIVAL_MAX) more, if nothing absorbs.
+const VERTICES_EXPECTED: u64 = 28;
 /// Scatterings that are counted at most.
 const BOUNCES_MAX: u32 = 4000;
 /// Scatterings that light subpaths are followed through at most, so that none is followed for ever between lossless surfaces.
@@ -69,6 +73,8 @@ crate::settings! {
         pub light_paths: u32 = 0, in 0..=LIGHT_PATHS_MAX, unit "paths per sample";
         /// Samples of each pixel in a pass, whose eye paths are joined to the light subpaths of all of them: small pictures fill the device so. 0 for as many as make 65536
         /// paths, up to 8. Changes the noise only.
+        ///
+        /// Above 1 the layer `variance` lacks the noise of the vertices that samples of a pass share.
         pub samples_at_once: u32 = 0, in 0..=SAMPLES_AT_ONCE_MAX, unit "samples";
         /// Vertices of light subpaths that each vertex of an eye path is joined to, drawn evenly from all of the pass; changes the noise only.
         pub connections: u32 = 1, in 1..=16, unit "connections";
@@ -95,6 +101,8 @@ crate::settings! {
         pub submission_work: u64 = 0;
         /// Eye paths under way together, at most; 0 chooses by the kind of device. Never changes the picture.
         pub paths_in_flight: u32 = 0;
+        /// Loop iterations after which a ray goes on in a later dispatch, at most; 0 for as many as the device's loops allow. Never changes the picture.
+        pub ray_quota: u32 = 0;
     }
     check BidirectionalSettings::fits_together;
 }
@@ -127,6 +135,19 @@ impl BidirectionalSettings {
         self.most_bounces != Some(0) && (self.strategies.connects() || self.strategies.splats())
     }
 
+    /// Whether eye paths are joined to light subpaths: a joint has a scattering at each of its ends.
+    pub(super) fn joins(&self) -> bool {
+        self.has_light_paths() && self.strategies.connects() && self.most_bounces.is_none_or(|most| most > 1)
+    }
+
+    /// Loop iterations after which a ray goes on in a later dispatch.
+    pub(super) fn quota(&self) -> u32 {
+        match self.ray_quota {
+            0 => RAY_QUOTA,
+            wanted => wanted.min(RAY_QUOTA),
+        }
+    }
+
     /// Samples of a pass, at most: of small pictures all of them.
     pub(super) fn samples_of_pass(&self) -> u32 {
         match self.samples_at_once {
@@ -135,11 +156,47 @@ impl BidirectionalSettings {
         }
     }
 
-    /// With no more samples at once than a device has room for the sums of, where light subpaths meet the camera.
+    /// With no more samples at once than a device has room for the sums of, where light subpaths meet the camera, and where their number is to be chosen, with no more
+    /// light subpaths than it has room for the vertices of.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] where those of one sample are too many.
+    /// [`Error::LimitExceeded`] where the sums of one sample are too many.
     pub(super) fn within(self, caps: &Caps, size: [u32; 2]) -> Result<Self> {
+        let settings = self.within_sums(caps, size)?;
+        Ok(settings.with_room_for(vertices_within(caps), size))
+    }
+
+    /// For a pilot picture in place of a picture: with as many light subpaths for each of its pixels and samples.
+    pub(super) fn of_pilot(self, picture: [u32; 2], pilot: [u32; 2]) -> Self {
+        let pixels = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+        let [of_picture, of_pilot] = [picture, pilot].map(pixels);
+        if of_picture == of_pilot {
+            return self;
+        }
+        let [samples, paths] = self.pass_of(of_picture.min(u32::MAX.into()) as u32);
+        let share = (u64::from(paths) * of_pilot).div_ceil(of_picture.max(1));
+        Self {
+            light_paths: share.clamp(1, paths.into()) as u32,
+            samples_at_once: samples,
+            ..self
+        }
+    }
+
+    /// With light subpaths that leave no more vertices than that, where their number is to be chosen.
+    fn with_room_for(self, vertices: u64, [width, height]: [u32; 2]) -> Self {
+        let [samples, paths] = self.pass_of(width.saturating_mul(height));
+        let most = vertices / VERTICES_EXPECTED / u64::from(samples);
+        if self.light_paths > 0 || u64::from(paths) <= most {
+            return self;
+        }
+        Self {
+            light_paths: most.max(1) as u32,
+            samples_at_once: samples,
+            ..self
+        }
+    }
+
+    fn within_sums(self, caps: &Caps, size: [u32; 2]) -> Result<Self> {
         if !self.strategies.splats() {
             return Ok(self);
         }
@@ -181,6 +238,7 @@ impl BidirectionalSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::shaders::constants::{CAPPED_BOUNCE, SURVIVAL_MAX};
     use crate::settings::TypedSettings;
 
     #[test]
@@ -208,6 +266,65 @@ mod tests {
             ..of(0, None)
         };
         assert!(!alone.has_light_paths());
+    }
+
+    #[test]
+    fn joints_need_light_subpaths_and_two_scatterings() {
+        let of = |most_bounces, strategies| BidirectionalSettings {
+            most_bounces,
+            strategies,
+            ..BidirectionalSettings::default()
+        };
+        for (most, strategies, joins) in [
+            (None, Strategies::Combined, true),
+            (Some(2), Strategies::Connections, true),
+            (Some(1), Strategies::Combined, false),
+            (Some(0), Strategies::Combined, false),
+            (None, Strategies::Splats, false),
+        ] {
+            assert_eq!(of(most, strategies).joins(), joins, "{most:?} {strategies:?}");
+        }
+    }
+
+    #[test]
+    fn light_subpaths_are_as_many_as_there_is_room_for_their_vertices() {
+        let of = |light_paths| BidirectionalSettings {
+            light_paths,
+            ..BidirectionalSettings::default()
+        };
+        let mean = f64::from(CAPPED_BOUNCE) + 1.0 / (1.0 - f64::from(SURVIVAL_MAX));
+        assert!((mean - VERTICES_EXPECTED as f64).abs() < 1e-3, "{mean}");
+        let pass = |settings: BidirectionalSettings, vertices| {
+            settings.check().unwrap();
+            settings.with_room_for(vertices, [128, 128]).pass_of(128 * 128)
+        };
+        assert_eq!(pass(of(0), 65_536 * 28), [4, 16_384]);
+        assert_eq!(pass(of(0), 65_536 * 28 - 1), [4, 16_383]);
+        assert_eq!(pass(of(0), 21_845), [4, 195]);
+        assert_eq!(pass(of(0), 0), [4, 1]);
+        // Whoever asks for more may have them.
+        assert_eq!(pass(of(9000), 21_845), [4, 9000]);
+    }
+
+    #[test]
+    fn pilots_have_as_many_light_subpaths_a_pixel_as_the_picture() {
+        let of = |light_paths, samples_at_once| BidirectionalSettings {
+            light_paths,
+            samples_at_once,
+            ..BidirectionalSettings::default()
+        };
+        for (settings, picture, pilot, expected) in [
+            (of(0, 0), [128, 128], [128, 128], [4, 16_384]),
+            // A pass of a large picture has 65536 for all of its pixels.
+            (of(0, 0), [1920, 1080], [170, 96], [1, 516]),
+            (of(0, 0), [512, 256], [128, 64], [1, 4096]),
+            (of(1000, 2), [1920, 1080], [170, 96], [2, 8]),
+            (of(1, 2), [1920, 1080], [2, 2], [2, 1]),
+        ] {
+            let pilots = settings.of_pilot(picture, pilot);
+            pilots.check().unwrap();
+            assert_eq!(pilots.pass_of(pilot[0] * pilot[1]), expected, "{picture:?}");
+        }
     }
 
     #[test]

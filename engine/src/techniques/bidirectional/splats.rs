@@ -2,6 +2,7 @@
 
 use super::kernels::{quota_of, work};
 use super::settings::BidirectionalSettings;
+use crate::gpu::shaders::constants::LIGHT_VERTEX_QUARTERS;
 use crate::gpu::shaders::sets::BidirectionalSet;
 use crate::gpu::shaders::techniques::bidirectional::{bdpt_add, bdpt_camera, bdpt_splat};
 use crate::gpu::shaders::types::{LightSplat, SplatSum};
@@ -9,6 +10,9 @@ use crate::gpu::{Buffer, Caps, ComputePipeline, Gpu};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::{GpuScene, surface_spec};
 use crate::{Error, Result};
+
+/// Sums are the same bits for up to as many splats.
+const SPLATS_MAX: u64 = 1 << 22;
 
 /// Whose vertices are shown.
 #[derive(Debug, Clone, Copy)]
@@ -20,7 +24,7 @@ pub(super) struct ShownWalks {
 }
 
 /// Kernels and memory of what the camera is shown.
-pub(super) struct Shown {
+pub(super) struct CameraSplats {
     pub pipeline: ComputePipeline<bdpt_camera::Kernel>,
     pub splat: ComputePipeline<bdpt_splat::Kernel>,
     pub add: ComputePipeline<bdpt_add::Kernel>,
@@ -31,7 +35,7 @@ pub(super) struct Shown {
     bounces: [u32; 2],
 }
 
-impl Shown {
+impl CameraSplats {
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
@@ -116,7 +120,7 @@ pub(super) fn camera_pipeline(
         has_lens: frame.lens_radius > 0.0 && !frame.orthographic,
         parallel_camera: frame.orthographic,
         strategy: settings.strategies.kind(),
-        index_quota: quota_of(gpu, scene, 1)?,
+        index_quota: quota_of(gpu, scene, settings, 1)?,
         index_kind: traversal.kind(),
         ..Default::default()
     });
@@ -126,6 +130,13 @@ pub(super) fn camera_pipeline(
 /// Room for what so many vertices show.
 pub(super) fn splats(gpu: &Gpu, vertices: u32) -> Result<Buffer> {
     work(gpu, "light splats", size_of::<LightSplat>(), vertices)
+}
+
+/// Vertices that a buffer of the device can hold, and sums can add.
+pub(super) fn vertices_within(caps: &Caps) -> u64 {
+    let quarter = size_of::<[u32; 4]>() as u64;
+    let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / quarter);
+    (quarters / u64::from(LIGHT_VERTEX_QUARTERS)).min(SPLATS_MAX)
 }
 
 /// Sums of every pixel that a buffer of the device holds.

@@ -156,6 +156,7 @@ const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/instant_radiosity/agreement.rs::unbounded_lights_agree_with_the_path_tracer_in_a_sphere",
             "tests/tests/instant_radiosity/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
+            "tests/tests/instant_radiosity/agreement.rs::bodies_that_absorb_agree_with_the_path_tracer",
             "tests/tests/instant_radiosity/edge_cases.rs::parts_of_the_light_sum_to_the_whole",
             "tests/tests/instant_radiosity/edge_cases.rs::parts_of_the_light_are_whole_with_a_compensated_bound",
             "tests/tests/instant_radiosity/edge_cases.rs::waves_shrink_until_gathering_fits_beside_them",

@@ -23,6 +23,7 @@ use crate::gpu::shaders::types::{self, Differentials};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
 use crate::gpu::{TexelView, Timings};
 use crate::transport::random::SamplerKind;
+use crate::transport::surface_spec::emission_spec;
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
@@ -260,22 +261,12 @@ impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let has_differentials = plan.follows_footprints;
-        let emit = photon_emit::Spec {
-            has_textures: profile.has_textures,
-            has_vertex_colors: profile.has_vertex_colors,
-            has_shading_normals: false,
-            has_normal_maps: false,
-            has_unlit: false,
-            has_instances: profile.keeps_instances,
-            has_alpha: profile.has_alpha(),
-            has_environment: profile.has_environment(),
-            has_area_lights: scene.has_area_lights(),
-            has_punctual_lights: scene.has_punctual_lights(),
+        let emit = emission_spec!(photon_emit, scene, {
             sampler_kind: plan.sampler as u32,
             has_differentials,
             even_survival: plan.even_survival,
             ..Default::default()
-        };
+        });
         let scatter = surface_spec!(photon_scatter, scene, {
             has_multiple_scattering: bsdf.multiple_scattering,
             separable_masking: false,
@@ -624,6 +615,7 @@ pub(crate) const ROWS: &[Row] = &[
             sources::FABIANOWSKI_2011.at("§3.4.1 and §5.2.3"),
         ],
         shaders: &[
+            "shaders/transport/emission.glsl",
             "shaders/techniques/photon_mapping/photon_emit.comp",
             "shaders/techniques/photon_mapping/photon_scatter.comp",
             "shaders/techniques/photon_mapping/photon_append.comp",
@@ -636,6 +628,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/lights.rs::points_spots_and_suns_shine_as_they_should",
             "tests/tests/photon/lights.rs::lamps_and_skies_shine_as_they_should",
             "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
+            "tests/tests/photon/materials.rs::lights_inside_a_body_that_absorbs_shine_through_it",
+            "engine/src/transport/gpu_scene/bodies.rs::lights_know_which_body_is_around_them",
         ],
         settings: &["photons"],
         ..Row::of(file!())

@@ -1,20 +1,20 @@
 //! Instances that are kept: their meshes are stored once, in their own space, and an index of two levels places them.
 //!
 //! Kept is an instance of a mesh that is placed more than once and has an area, where rays can be traced through its transform. Flattened, as all instances are
-//! elsewhere, are those of materials that emit, since light sampling chooses among triangles in world space; those of bodies in scenes with media, which know what is around them; and
-//! those by transforms that are too uneven ([`InstanceTransform::of`]). All triangles have the numbers that they would have if all were
+//! elsewhere, are those of materials that emit, since light sampling chooses among triangles in world space; those of bodies in scenes with media, which know what is around them; those of bodies that absorb where a light is in the box around them, since light that
+//! leaves it inside is absorbed; and those by transforms that are too uneven ([`InstanceTransform::of`]). All triangles have the numbers that they would have if all were
 //! flattened. A kept triangle that lies exactly where an emitting one lies is not looked for, as flattened ones are: light sampling takes the emitter as if it were in front.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use super::bodies::bounds_body;
+use super::bodies::{bounds_body, boxes_meet, lamp_boxes, placed_box};
 use super::geometry::{Geometry, TRIANGLE_TEXELS, corners_of, has_attributes, is_traceable, numbered_instances};
 use crate::accel::can_be_met;
 use crate::accel::two_level::{INSTANCE_BYTES, InstanceTransform, MAX_INSTANCES, MeshGeometry, Placement, TwoLevelBvh};
 use crate::accel::wide::WideSettings;
 use crate::gpu::shaders::constants::INSTANCE_IDENTITY;
 use crate::gpu::shaders::types::{SceneInstance, SceneTriangle};
-use crate::scene::{Mesh, Scene, SceneProfile};
+use crate::scene::{Instance, Mesh, Scene, SceneProfile};
 use crate::{Error, Result};
 
 /// How many times what keeping instances needs flattening must need for that to be chosen: rays in two levels take longer.
@@ -71,6 +71,20 @@ impl Keeping {
                 Some([met, spared_box(mesh)])
             })
             .collect();
+        let lamps = if profile.has_absorption {
+            lamp_boxes(scene)
+        } else {
+            Vec::new()
+        };
+        let holds_lamp = |instance: &Instance| {
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let material = mesh.material.map(|index| &scene.materials[index as usize]);
+            let absorbs = material.is_some_and(|m| bounds_body(m) && m.attenuation_color.min_element() < 1.0);
+            absorbs && !lamps.is_empty() && {
+                let around = placed_box(mesh, instance);
+                lamps.iter().any(|lamp| boxes_meet(&around, lamp))
+            }
+        };
         let mut kept_meshes = vec![false; scene.meshes.len()];
         let instances: Vec<bool> = scene
             .instances
@@ -79,6 +93,7 @@ impl Keeping {
                 // The tree's box lies between both; what is out of range in the mesh's own space need not be so in the world.
                 let fits = |part: [DVec3; 2]| InstanceTransform::of(&instance.transform, &[part]).is_some();
                 let kept = parts[instance.mesh as usize].is_some_and(|parts| parts.into_iter().all(fits));
+                let kept = kept && !holds_lamp(instance);
                 kept_meshes[instance.mesh as usize] |= kept;
                 kept
             })

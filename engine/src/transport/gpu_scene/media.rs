@@ -2,7 +2,6 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::bodies::Bodies;
 use crate::Result;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{PHASE_HENYEY_GREENSTEIN, PHASE_ISOTROPIC, PHASE_RAYLEIGH, PHASE_SCHLICK};
@@ -23,13 +22,12 @@ pub(super) struct GpuMedia {
     records: TexelView,
     densities: TexelView,
     majorants: TexelView,
-    pub(super) bodies: Bodies,
     /// The medium outside all bodies.
     pub(super) surrounding: Option<u32>,
 }
 
 impl GpuMedia {
-    pub(super) fn new(gpu: &Gpu, scene: &Scene, bodies: Bodies) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         let (mut densities, mut majorants) = (Vec::new(), Vec::new());
         let media = scene.media.iter();
         let records: Vec<_> = media
@@ -43,7 +41,6 @@ impl GpuMedia {
             records: gpu.texels_with("media", Category::Material, format, bytes)?,
             densities: texels("densities", &densities)?,
             majorants: texels("majorants", &majorants)?,
-            bodies,
             surrounding: scene
                 .surrounding
                 .filter(|&index| !scene.media[index as usize].is_empty()),

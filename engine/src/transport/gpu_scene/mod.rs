@@ -64,6 +64,8 @@ pub struct GpuScene {
     /// Where instances are kept: what moves them.
     kept: Option<Mutex<Kept>>,
     buffers: SceneBuffers,
+    /// Where it matters which body a point is in.
+    bodies: Option<Bodies>,
     media: Option<GpuMedia>,
 }
 
@@ -135,7 +137,7 @@ impl GpuScene {
     /// as where thousands of triangles lie in one place, is replaced by the binned hierarchy, and the report says so ([`IndexReport::instead_because`]).
     ///
     /// With [`IndexKind::TwoLevel`] instances are kept: meshes that are placed more than once are stored once, but for those that emit light, those without an area, those that are
-    /// bodies in scenes with media, and instances by transforms too uneven for rays ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)). Their vertices are in
+    /// bodies in scenes with media, those that absorb with a light in the box around them, and instances by transforms too uneven for rays ([`InstanceTransform::of`](crate::accel::two_level::InstanceTransform::of)). Their vertices are in
     /// other places by rounding in f32, so pictures differ by as much. [`IndexKind::Automatic`] keeps instances where flattening them would need at least eight times as
     /// many bytes of geometry and index as that, and 64 MiB or more, or more texels than the device can bind, or more bytes than it has memory; elsewhere it is the
     /// wide hierarchy.
@@ -173,7 +175,7 @@ impl GpuScene {
             None => Geometry::flatten(scene, &profile)?,
         };
         profile.keeps_instances = geometry.kept.is_some();
-        let bodies = profile.media.any().then(|| Bodies::place(scene, &mut geometry));
+        let bodies = bodies::matter(scene, &profile).then(|| Bodies::place(scene, &mut geometry));
         let bounds = geometry.bounds();
         let kept = match &keeping {
             Some((_, settings)) => index_over_instances(gpu, &mut geometry, &profile, settings)?,
@@ -194,14 +196,18 @@ impl GpuScene {
             .iter()
             .map(|(material, _)| material_record(&mut textures, &mut metals, scene, material))
             .collect();
-        let lights = Lights::collect(scene, &profile, &mut geometry, &records, bounds)?;
+        let mut lights = Lights::collect(scene, &profile, &mut geometry, &records, bounds)?;
+        if let Some(bodies) = &bodies {
+            bodies.enclose(scene, &mut lights.records, &geometry);
+        }
         let albedo: &[f32] = if bsdf.specular_layer || bsdf.multiple_scattering {
             &AlbedoTable::shared().values
         } else {
             &[]
         };
         let buffers = SceneBuffers::upload(gpu, &geometry, &records, &textures, &lights, albedo)?;
-        let media = bodies.map(|bodies| GpuMedia::new(gpu, scene, bodies)).transpose()?;
+        let has_media = profile.media.any();
+        let media = has_media.then(|| GpuMedia::new(gpu, scene)).transpose()?;
         Ok(Self {
             bsdf,
             // What is rasterized is drawn triangle by triangle.
@@ -221,6 +227,7 @@ impl GpuScene {
             index,
             kept,
             buffers,
+            bodies,
             media,
         })
     }
@@ -368,7 +375,10 @@ impl GpuScene {
     /// [`Error::Setting`] for a light that does not exist or has no power, for one of another kind or another power, and for
     /// numbers that [`Scene::check`] refuses; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn move_light(&self, gpu: &Gpu, light: usize, kind: &LightKind) -> Result<()> {
-        let (record, index) = self.punctual_lights.moved(light, kind)?;
+        let (mut record, index) = self.punctual_lights.moved(light, kind)?;
+        if let Some(bodies) = &self.bodies {
+            bodies.enclose_point(&mut record);
+        }
         let offset = u64::from(index) * size_of::<SceneLight>() as u64;
         gpu.upload(self.buffers.lights.buffer(), offset, &[record])?;
         self.punctual_lights.keep(light, kind);
@@ -413,7 +423,8 @@ impl GpuScene {
     /// Index of the material of the innermost body around a point, in scenes with participating media: of the solids that refract and the
     /// boundaries of media.
     pub fn body_around(&self, point: DVec3) -> Option<u32> {
-        self.media.as_ref()?.bodies.around(point)
+        self.media.as_ref()?;
+        self.bodies.as_ref()?.around(point)
     }
 
     /// Set 1.

@@ -84,7 +84,7 @@ impl GpuScene {
 
     /// Puts instances of the scene, by their numbers, to other places, where instances are kept: rays meet them there from here on, as if the scene had been
     /// made so. Of the index only the tree over the instances is made anew ([`GpuScene::index_work`] counts). What is known of the scene as a whole stays: its
-    /// box ([`GpuScene::bounds`]), with the power of distant lights, and its [`GpuScene::surface_area`].
+    /// box ([`GpuScene::bounds`]), with the power of distant lights, its [`GpuScene::surface_area`], and which lights are inside bodies that absorb.
     ///
     /// Pictures under way must be restarted, or they mix both; nothing that reads the scene may be under way.
     ///

@@ -168,6 +168,7 @@ measures! {
     on_device "technique-choice" rendering::technique_choice;
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
+    on_device "walk-agreement" rendering::walk_agreement;
 }
 
 /// The measure of that name.

@@ -1,5 +1,5 @@
 //! Whole pictures: whether they are what was asked for, how their lights are chosen, what many lamps cost, what they cost and where, how they stop, their sums and files, and agreement with
-//! Mitsuba 3 and with Cycles.
+//! each other, with Mitsuba 3 and with Cycles.
 
 pub mod adaptive_choice;
 pub mod automatic_choice;
@@ -16,3 +16,4 @@ pub mod stops;
 mod sums;
 pub mod technique_choice;
 mod unseen_features;
+pub mod walk_agreement;
