@@ -7,6 +7,7 @@
 
 #include "techniques/photon_mapping/kernel.glsl"
 #include "techniques/photon_mapping/photon_event.glsl"
+#include "techniques/photon_mapping/photon_footprint.glsl"
 
 Differentials in_differentials(uint i) { return Differentials(in3(i), in3(i + 3u), in3(i + 6u), in3(i + 9u)); }
 
@@ -116,6 +117,19 @@ void main() {
         out_bits(10u, e.bounce);
         out_bits(11u, event_ends_leaf(q1) ? 1u : 0u);
         out1(12u, ball_profile(in_bits(13u), in1(14u)));
+        break;
+    }
+    case 7u: {  // footprints in media
+        Differentials d = Differentials(in3(0u), in3(3u), in3(6u), in3(9u));
+        EventKernelSettings s = EventKernelSettings(in1(12u), in1(13u), in1(14u), in1(15u), in1(16u));
+        float across = footprint_across(d, in1(17u), in3(18u));
+        out1(0u, event_radius(s, across, in1(21u), in1(22u)));
+        Differentials scattered = scattered_in_medium(across, in1(21u), in1(22u), in1(23u), in3(18u), in1(24u));
+        out1(1u, length(scattered.z1));
+        out1(2u, length(scattered.w2));
+        out3(3u, passed_differentials(d, in1(23u)).z2);
+        out1(6u, across);
+        out1(7u, log_of_one_plus(in1(25u)));
         break;
     }
     }

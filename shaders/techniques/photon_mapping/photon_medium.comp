@@ -6,15 +6,21 @@
 // for all bands. A collision stores the flux that it scatters; the photon goes on with the probability that leaves its largest band as it is. Where a medium
 // scatters nothing there are no collisions, and light is weighted by the transmittance instead.
 //
-// PM-PH-1, PM-PD-12: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.1.3 and 7.2.3; H. W. Jensen and P. H. Christensen, "Efficient Simulation of
+// Where kernels follow footprints these pass and scatter with the photon (photon_footprint.glsl); in grids what has passed is reckoned from the bounds of the density.
+//
+// PM-PH-1, PM-PD-9 to PM-PD-12: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.1.3 and 7.2.3; H. W. Jensen and P. H. Christensen, "Efficient Simulation of
 // Light Transport in Scenes with Participating Media Using Photon Maps", 1998. Deterministic in (seed, pass, photon).
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 layout(local_size_x = 64) in;
 
+#include "techniques/photon_mapping/photon_features.glsl"
+#define CLERESTORY_GRID_BOUNDS HAS_DIFFERENTIALS
+
 #include "transport/features.glsl"
 #include "transport/media_features.glsl"
+#include "techniques/photon_mapping/photon_footprint.glsl"
 #include "techniques/photon_mapping/photon_volume.glsl"
 #include "transport/path_set.glsl"
 #include "walk/media.glsl"
@@ -25,7 +31,7 @@ layout(push_constant, scalar) uniform Push {
     uint last_bounce;    // greatest number of scatterings before a collision that is stored
     uint first_deposit;  // least
     float flux_scale;    // of fluxes as they are stored
-    float radius;        // of kernels
+    EventKernelSettings kernel;  // without footprints all have the greatest radius
 } push;
 
 #include "walk/draws.glsl"
@@ -35,20 +41,28 @@ layout(push_constant, scalar) uniform Push {
 #include "transport/phase.glsl"
 #include "walk/survival.glsl"
 
+// What a collision's kernel and the next footprint are made of.
+struct Footprint {
+    float across;  // m2
+    float pdf;     // of the collision on the way, 1/m
+    float here;    // extinction there, of what photons collide with, 1/m
+    float most;    // the same at the greatest density
+};
+
 // Stores a collision at `at`, after which the photon has the flux that is scattered.
-uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at) {
+uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, float radius) {
     atomicAdd(photon_medium_counters.events, 1u);
     uint bounce = path_set_bounce(photon.bounce);
     uvec4 q0;
     uvec4 q1;
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
-    pack_event(PhotonEvent(at, photon.direction, flux, push.radius, medium, bounce), q0, q1);
+    pack_event(PhotonEvent(at, photon.direction, flux, radius, medium, bounce), q0, q1);
     store_waiting(place, q0, q1, uvec4(0u));
     return FLAG_WAITING | FLAG_VOLUME;
 }
 
 // The photon's new direction at a collision, which has left `photon.throughput` of what there was `before`; false when it ends.
-bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, inout WalkState photon) {
+bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout WalkState photon) {
     uint bounce = path_set_bounce(photon.bounce);
     if (bounce >= push.last_bounce) {
         return false;
@@ -60,7 +74,12 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, inout WalkState pho
     }
     vec2 u = bounce_sample(slot, bounce, DIMENSION_DIRECTION);
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
-    photon.direction = normalize(phase_direction(photon.direction, c, u.y));
+    vec3 wi = normalize(phase_direction(photon.direction, c, u.y));
+    if (HAS_DIFFERENTIALS) {
+        float phase = phase_function(m.phase, m.phase_parameter, photon.direction, wi);
+        photon_medium_differentials[slot] = scattered_in_medium(f.across, f.pdf, f.here, survival, wi, phase);
+    }
+    photon.direction = wi;
     photon.origin = at;
     photon.throughput /= survival;
     photon.bounce = path_set_joined(bounce + 1u, PHOTON_DIFFUSED);
@@ -99,6 +118,8 @@ void main() {
     uint outcome = GRID_LEFT;
     SceneMedium m;
     float t = 0.0;  // of a collision, or of a stop, along the ray
+    float passed = 1.0;  // share of photons that come as far, of those that began the way
+    Footprint f = Footprint(0.0, 0.0, 0.0, 0.0);
     if (medium != NO_MEDIUM && end > state.start) {
         m = load_medium(medium);
         bool passes = m.sigma_s == vec3(0.0);
@@ -110,6 +131,12 @@ void main() {
             } else {
                 Sampler s = walk_sampler(slot, dimension);
                 FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, state.bands, t_max, sample_2d(s));
+                if (HAS_DIFFERENTIALS) {
+                    f.pdf = collision_density(m.sigma_t, state.bands, flight.t);
+                    f.here = dot(flight.bands, m.sigma_t);
+                    f.most = f.here;
+                    passed = dot(state.bands, transmittance(m.sigma_t, flight.t));
+                }
                 weight = flight.weight;
                 state.bands = flight.bands;
                 outcome = flight.collides ? GRID_COLLIDED : GRID_LEFT;
@@ -119,7 +146,15 @@ void main() {
             uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
             GridWalk walk = begin_grid_walk(m, photon.origin, photon.direction, state.start, end);
             vec3 emitted = vec3(0.0);
+            vec3 bands = state.bands;
             outcome = delta_tracking(m, key, vec3(0.0), passes, walk, state.bands, weight, emitted);
+            if (HAS_DIFFERENTIALS && !passes) {
+                float density = outcome == GRID_COLLIDED ? grid_density(m, walk) : 0.0;
+                f.pdf = density * collision_density(m.sigma_t, bands, m.tightness * walk.bound);
+                f.here = density * dot(state.bands, m.sigma_t);
+                f.most = m.density_max * dot(state.bands, m.sigma_t);
+                passed = dot(bands, transmittance(m.sigma_t, m.tightness * walk.bound));
+            }
             t = walk.entry + walk.t;
             float reached = resumed_start(state.start, t);
             // The search that goes on from the surface itself would miss it.
@@ -144,10 +179,15 @@ void main() {
         if (photon.throughput != vec3(0.0)) {
             // What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
             vec3 at = photon.origin + max(t, 0.0) * photon.direction;
-            if (path_set_bounce(photon.bounce) >= push.first_deposit) {
-                flags = deposit(slot, place, photon, medium, at);
+            float radius = push.kernel.length_max;
+            if (HAS_DIFFERENTIALS) {
+                f.across = footprint_across(photon_medium_differentials[slot], t, photon.direction);
+                radius = event_radius(push.kernel, f.across, f.pdf, f.most);
             }
-            alive = scatter(slot, m, before, at, photon);
+            if (path_set_bounce(photon.bounce) >= push.first_deposit) {
+                flags = deposit(slot, place, photon, medium, at, radius);
+            }
+            alive = scatter(slot, m, before, at, f, photon);
             state.start = 0.0;
         }
     } else if (outcome == GRID_STOPPED) {
@@ -159,6 +199,9 @@ void main() {
         alive = photon.throughput != vec3(0.0);
     } else {
         handled = false;
+    }
+    if (HAS_DIFFERENTIALS && outcome != GRID_COLLIDED) {
+        photon_medium_differentials[slot] = passed_differentials(photon_medium_differentials[slot], passed);
     }
     walk_gathered[slot].interior = interior;
     walk_medium_states[slot] = state;

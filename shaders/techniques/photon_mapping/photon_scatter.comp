@@ -52,7 +52,7 @@ void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 n
     } else {
         // Of fixed size, or a footprint beyond all bounds.
         kernel = disk_kernel(settings.length_max * settings.unit_length, normal);
-        fit = !HAS_DIFFERENTIALS || settings.widens_flat != 0u;
+        fit = !HAS_DIFFERENTIALS || settings.shape == KERNEL_FIXED || settings.widens_flat != 0u;
     }
     if (!fit) {
         atomicAdd(photon_counters.without_kernel, 1u);

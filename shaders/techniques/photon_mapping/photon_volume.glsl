@@ -5,6 +5,7 @@
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_VOLUME_GLSL
 
 #include "techniques/photon_mapping/photon_event.glsl"
+#include "transport/differentials.glsl"
 #include "walk/wave.glsl"
 
 // descriptor set 1: PhotonVolumeSet
@@ -25,5 +26,6 @@ layout(set = 1, binding = 2, scalar) restrict buffer PhotonVolumeWaiting { uint 
 layout(set = 1, binding = 3, scalar) restrict buffer PhotonVolumeFlags { uint photon_volume_flags[]; };  // by place of the waiting queue
 layout(set = 1, binding = 4, scalar) restrict readonly buffer PhotonVolumeRanks { uint photon_volume_ranks[]; };
 layout(set = 1, binding = 5, scalar) restrict writeonly buffer PhotonVolumeRecords { uvec4 photon_volume_records[]; };
+layout(set = 1, binding = 6, scalar) restrict buffer PhotonMediumDifferentials { Differentials photon_medium_differentials[]; };  // by slot
 
 #endif

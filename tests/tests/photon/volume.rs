@@ -3,7 +3,8 @@
 use super::*;
 use clerestory::Error;
 use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase, Projection};
-use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
+use clerestory::techniques::photon_mapping::volume::event::PhotonEvent;
+use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
 use clerestory::techniques::photon_mapping::{MapBuild, MappedEvent};
 use clerestory_tests::child::hash_in_child;
 use clerestory_tests::render::{builtin, cuboid};
@@ -290,6 +291,63 @@ fn grids_agree_with_the_path_tracer() {
 }
 
 #[test]
+fn kernels_from_footprints_hold_as_many_collisions_as_they_should() {
+    with_gpu(|gpu| {
+        let scene = endless(medium(1.0, 0.5, Phase::Isotropic));
+        let settings = PhotonSettings {
+            volume_kernel: VolumeKernel::Footprint,
+            volume_dampening: 0.0,
+            volume_radius: 1e3,
+            ..direct(1 << 14)
+        };
+        let (events, _) = all_events(gpu, &scene, &settings, 0);
+        let first: Vec<_> = events.iter().map(|e| e.event).filter(|e| e.bounce == 0).collect();
+        // The radius is three times the cube root of the volume that a collision has: 4π r² e^r / n at a distance of r.
+        for event in first.iter().step_by(97) {
+            let r = f64::from(event.position.length());
+            let volume = 4.0 * PI * r * r * r.exp() / 16_384.0;
+            let ratio = f64::from(event.radius) / (3.0 * volume.cbrt());
+            // Directions and lengths in f32.
+            assert!((ratio - 1.0).abs() < 1e-4, "{r}: {ratio}");
+        }
+        // In such a ball lie 4π/3 · 27 = 113 of them, where their density is even; about a mean free path from the light it is within a tenth.
+        let near: Vec<_> = first.iter().filter(|e| (0.7..1.3).contains(&e.position.length())).collect();
+        let inside = |e: &PhotonEvent| {
+            let within = |other: &PhotonEvent| {
+                other.position.distance(e.position) < e.radius
+            };
+            first.iter().filter(|other| within(other)).count() as f64
+        };
+        let counts: Vec<f64> = near.iter().step_by(16).map(|e| inside(e)).collect();
+        let mean = counts.iter().sum::<f64>() / counts.len() as f64;
+        println!("collisions in the ball: {mean:.1}, of even ones 113.1");
+        assert!((mean / 113.1 - 1.0).abs() < 0.1, "{mean}");
+        // Further collisions have wider kernels, by the distance from which they were scattered anew.
+        assert!(events.iter().all(|e| e.event.radius > 0.0 && e.event.radius.is_finite()));
+    });
+}
+
+#[test]
+fn kernels_from_footprints_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let fog = lit_box(medium(2.0, 0.8, Phase::HenyeyGreenstein { g: 0.5 }));
+        let grid = lit_box(uneven(medium(2.0, 0.8, Phase::Isotropic)));
+        for (scene, shape) in [(fog, KernelShape::Isotropic), (grid, KernelShape::Fixed)] {
+            let settings = PhotonSettings {
+                shape,
+                volume_kernel: VolumeKernel::Footprint,
+                volume_spread: 1.5,
+                volume_radius: 0.03,
+                radius: 0.1,
+                photons: 1 << 14,
+                ..settings("bounces=2..4")
+            };
+            expect_agreement(gpu, &scene, &settings, [16, 1024], [3e-2; 3]);
+        }
+    });
+}
+
+#[test]
 fn direct_photons_and_final_gather_have_the_same_light_in_media() {
     with_gpu(|gpu| {
         let scene = lit_box(medium(2.0, 0.8, Phase::Isotropic));
@@ -435,12 +493,11 @@ fn what_photons_cannot_bring_through_media_is_refused() {
         sky.environment = Some(Environment::uniform(Vec3::ONE));
         let error = refuse(&sky, settings("all"));
         assert!(error.to_string().contains("light from infinity"), "{error}");
-        let skewed = PhotonSettings {
-            shape: KernelShape::Skewed,
-            ..settings("all")
-        };
-        match refuse(&endless(medium(1.0, 0.5, Phase::Isotropic)), skewed) {
-            Error::Setting { name, .. } => assert_eq!(name, "shape"),
+        // Of a range of bounces alone, as everywhere.
+        let error = refuse(&endless(medium(1.0, 0.5, Phase::Isotropic)), settings("LS+VE"));
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+        match refuse(&endless(medium(1.0, 0.5, Phase::Isotropic)), single(VolumeEstimate::Ray, f32::NAN)) {
+            Error::Setting { name, .. } => assert_eq!(name, "volume_radius"),
             other => panic!("{other}"),
         }
     });

@@ -10,6 +10,9 @@ use clerestory::techniques::photon_mapping::kernel::{
 use clerestory::techniques::photon_mapping::volume::event::{
     PhotonEvent, ball_profile, event_ends_leaf, pack_event, unpack_event,
 };
+use clerestory::techniques::photon_mapping::volume::footprint::{
+    EventKernelSettings, event_radius, footprint_across, log_of_one_plus, passed_differentials, scattered_in_medium,
+};
 use clerestory::transport::differentials::{
     Differentials, area_light_differentials, camera_differentials, diffuse_reemission, emission_differentials,
     guard_differentials, normal_derivatives, parallel_beam_differentials, reflect_differentials, refract_differentials,
@@ -502,5 +505,65 @@ fn records_of_events_agree_with_their_twins() {
             let ball = ball_profile(PROFILES[case.0[13].to_bits() as usize], x[14]);
             assert!((f64::from(result.0[12]) - ball).abs() <= 8.0 * U, "{:?}", case.0);
         }
+    });
+}
+
+#[test]
+fn footprints_in_media_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(39, |r| {
+            let w = direction(r);
+            // Steps across the way, clear of flat footprints, whose product cancels.
+            let [z1, z2, w1, w2] = loop {
+                let across = [0; 2].map(|_| r.vector().cross(w));
+                if across[0].cross(across[1]).length() > 0.2 * across[0].length() * across[1].length() {
+                    let further = r.range(0.1, 2.0);
+                    break [across[0], across[1], further * across[0], further * across[1]];
+                }
+            };
+            let size = r.choose(&[1e-3, 1.0, 1e3]);
+            let rest = [
+                r.magnitude(-8, 2),
+                r.choose(&[0.0, 1.5, 10.0]),
+                size,
+                size * 1e-4,
+                size * r.choose(&[0.3, 1e6]),
+                size * r.range(0.1, 3.0),
+            ];
+            let densities = [
+                r.magnitude(-8, 4) / size,
+                r.magnitude(-4, 4) / size,
+                r.range(1e-5, 1.0),
+                r.range(0.01, 2.0),
+                r.magnitude(-16, 4),
+            ];
+            let mut all = list32(&[size * z1, size * z2, w1, w2], &rest);
+            all.extend(w.to_array());
+            all.extend(densities);
+            all
+        });
+        let results = twin_photons(gpu, 7, &table, &[]);
+        // Powers of a third and logarithms.
+        judge("footprints in media", &table, &results, ulps(64.0, 16.0, 0.0), 26, |x| {
+            let d = differentials(x, 0);
+            let settings = EventKernelSettings {
+                spread: x[12],
+                dampening: x[13],
+                unit_length: x[14],
+                length_min: x[15],
+                length_max: x[16],
+            };
+            let across = footprint_across(&d, x[17], v3(x, 18));
+            let scattered = scattered_in_medium(across, x[21], x[22], x[23], v3(x, 18), x[24]);
+            list![
+                [
+                    event_radius(&settings, across, x[21], x[22]),
+                    scattered.z1.length(),
+                    scattered.w2.length()
+                ],
+                passed_differentials(&d, x[23]).z2.to_array(),
+                [across, log_of_one_plus(x[25])]
+            ]
+        });
     });
 }

@@ -24,6 +24,7 @@ use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of}
 use super::settings::{MapBuild, PhotonSettings};
 use super::tracer::{PhotonAppend, PhotonCounts, PhotonTracer, Tracing, flux_scale};
 use super::volume::event::{EventWords, PhotonEvent, unpack_event};
+use super::volume::footprint::EventKernelSettings;
 use super::volume::{EventMap, EventMaps};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
@@ -116,8 +117,7 @@ impl PhotonMapper {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range and for kernels of surfaces that follow footprints in a scene with participating
-    /// media, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with media that emit, or with light from infinity in an endless one, and for a path set
+    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with media that emit, or with light from infinity in an endless one, and for a path set
     /// that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for packets of queries on
     /// a device without votes, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
@@ -136,11 +136,6 @@ impl PhotonMapper {
             });
         }
         let has_media = scene.profile().media.any();
-        if has_media && settings.follows_footprints() {
-            let cause = "has to be \"fixed\" in a scene with participating media: footprints do not follow photons there";
-            let shape = serde_json::to_value(settings.shape).unwrap_or_default();
-            return Err(Error::setting("shape", shape, cause));
-        }
         let eye_paths = settings.eye_paths(has_media)?;
         let eye_settings = PathTracerSettings {
             path_set: eye_paths,
@@ -155,7 +150,7 @@ impl PhotonMapper {
         let has_map = settings.needs_photons() && scene.has_lights();
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            PhotonTracer::new(gpu, Arc::clone(&scene), settings.plan(), append)
+            PhotonTracer::new(gpu, Arc::clone(&scene), settings.plan(has_media), append)
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
@@ -264,13 +259,13 @@ impl PhotonMapper {
             return Ok(None);
         };
         let mut timings = Vec::new();
-        let (kernel, watts, event_radius) = (self.kernel(pass), self.watts(), self.event_radius(pass));
+        let (kernel, watts, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
             let clock = Instant::now();
             let begun = photons.tracing.take();
-            let begin = || photons.tracer.begin(pass, Some(&kernel)).with_event_radius(event_radius);
+            let begin = || photons.tracer.begin(pass, Some(&kernel)).with_event_kernel(event_kernel);
             let mut tracing = begun.unwrap_or_else(begin);
             let all = photons.tracer.advance(&mut tracing)?;
             timings.append(&mut tracing.take_timings());
@@ -387,12 +382,12 @@ impl PhotonMapper {
     /// # Errors
     /// As [`PhotonMapper::step`].
     pub fn events(&mut self, pass: u32) -> Result<Vec<MappedEvent>> {
-        let (kernel, scale, radius) = (self.kernel(pass), self.watts(), self.event_radius(pass));
+        let (kernel, scale, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
         let Some(photons) = &mut self.photons else {
             return Ok(Vec::new());
         };
         photons.tracing = None;
-        let tracing = photons.tracer.begin(pass, Some(&kernel)).with_event_radius(radius);
+        let tracing = photons.tracer.begin(pass, Some(&kernel)).with_event_kernel(event_kernel);
         let traced = photons.tracer.finish(tracing)?;
         self.counts.photons += traced.counts;
         let Some(events) = photons.tracer.events() else {
@@ -430,9 +425,14 @@ impl PhotonMapper {
         self.settings.kernel(pass, self.diagonal(), self.scene.surface_area())
     }
 
-    /// Radius of the kernels of events in media, m, in a pass.
+    /// Radius of the kernels of events in media, m, in a pass; the greatest where they follow footprints.
     pub fn event_radius(&self, pass: u32) -> f64 {
         self.settings.event_radius(pass, self.diagonal())
+    }
+
+    /// How the kernels of events in media are made in a pass.
+    pub fn event_kernel(&self, pass: u32) -> EventKernelSettings {
+        self.settings.event_kernel(pass, self.diagonal())
     }
 
     /// Of the scene's box, m.

@@ -2,7 +2,8 @@
 
 use super::kernel::{KernelProfile, KernelSettings, KernelShape};
 use super::tracer::{PhotonPlan, Stored};
-use super::volume::VolumeEstimate;
+use super::volume::footprint::{EventKernelSettings, event_step};
+use super::volume::{VolumeEstimate, VolumeKernel};
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
 use crate::techniques::path::SAMPLES_PER_WAVE;
@@ -108,8 +109,16 @@ crate::settings! {
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
         /// How photons that have collided in media are seen: under disks across each eye ray, one query for all of it, or under balls at places along it.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
-        /// Radius of the kernels of photons in media, in the first pass; 0 for a fiftieth of the scene's diagonal.
+        /// Kernels of photons in media have one radius, or that of each photon's footprint.
+        pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
+        /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by the size of the scene.
+        ///
+        /// 0 stands for a fiftieth of the scene's diagonal for fixed kernels, a ninth for others.
         pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
+        /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
+        pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
+        /// From which size on kernels in media that follow footprints grow slower, by a logarithm, in unit lengths; 0 leaves them as they are.
+        pub volume_dampening: f32 = 3.0, in 0.0..;
         /// Takes direct light from the map, too, instead of by shadow rays; cannot be combined with final_gather.
         pub direct_photons: bool = false;
         /// Sees the map after one more diffuse reflection, caustics directly; cannot be combined with direct_photons.
@@ -210,27 +219,56 @@ impl PhotonSettings {
     ///
     /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011.
     pub(super) fn event_radius(&self, pass: u32, diagonal: f64) -> f64 {
+        let share = match self.volume_kernel {
+            VolumeKernel::Fixed => RADIUS_SHARE,
+            VolumeKernel::Footprint => UNIT_SHARE,
+        };
         let first = match f64::from(self.volume_radius) {
-            0.0 if diagonal > 0.0 => RADIUS_SHARE * diagonal,
+            0.0 if diagonal > 0.0 => share * diagonal,
             0.0 => 1.0,
             set => set,
         };
+        first * self.event_shrinkage(pass)
+    }
+
+    /// Radius of events' kernels in a pass relative to the first.
+    fn event_shrinkage(&self, pass: u32) -> f64 {
         let shrunk = shrinkage(pass, f64::from(self.reduction));
-        first
-            * match self.volume {
-                VolumeEstimate::Ray => shrunk,
-                VolumeEstimate::March => shrunk.powf(2.0 / 3.0),
-            }
+        match self.volume {
+            VolumeEstimate::Ray => shrunk,
+            VolumeEstimate::March => shrunk.powf(2.0 / 3.0),
+        }
+    }
+
+    /// Kernels of events in media in a pass, in a scene of that diagonal, m.
+    pub(super) fn event_kernel(&self, pass: u32, diagonal: f64) -> EventKernelSettings {
+        let unit_length = match f64::from(self.unit_length) {
+            0.0 if diagonal > 0.0 => UNIT_SHARE * diagonal,
+            0.0 => 1.0,
+            set => set,
+        };
+        let (length_max, shrunk) = (self.event_radius(pass, diagonal), self.event_shrinkage(pass));
+        EventKernelSettings {
+            spread: f64::from(self.volume_spread) * event_step(f64::from(self.photons)) * shrunk,
+            dampening: f64::from(self.volume_dampening),
+            unit_length,
+            length_min: match self.volume_kernel {
+                VolumeKernel::Fixed => length_max,
+                VolumeKernel::Footprint => (LENGTH_MIN * unit_length * shrunk).min(length_max),
+            },
+            length_max,
+        }
     }
 
     /// How photons are traced.
-    pub(super) fn plan(&self) -> PhotonPlan {
+    pub(super) fn plan(&self, has_media: bool) -> PhotonPlan {
+        let in_media = has_media && self.volume_kernel == VolumeKernel::Footprint;
         PhotonPlan {
             photons: self.photons,
             sampler: self.sampler,
             seed: self.seed,
             submission_work: self.submission_work,
-            follows_footprints: self.follows_footprints(),
+            follows_footprints: self.follows_footprints() || in_media,
             tells_caustics: self.final_gather,
             even_survival: false,
             stores_lights: false,

@@ -12,6 +12,7 @@
 use std::sync::Arc;
 
 use super::kernel::KernelSettings;
+use super::volume::footprint::EventKernelSettings;
 use super::volume::{Room, VolumePass, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
@@ -193,8 +194,8 @@ pub(in crate::techniques) struct Tracing {
     pass: u32,
     /// None for deposits that have none.
     kernel: Option<KernelSettings>,
-    /// Of the kernels of events in media, m.
-    event_radius: f64,
+    /// Kernels of events in media, if there are some.
+    event_kernel: Option<EventKernelSettings>,
     /// First photon of the wave under way, or of the next one.
     first_photon: u32,
     wave: Option<(WalkKey, WaveInFlight)>,
@@ -207,9 +208,12 @@ impl Tracing {
         std::mem::take(&mut self.traced.timings)
     }
 
-    /// With kernels of this radius, m, for events in media.
-    pub fn with_event_radius(self, event_radius: f64) -> Self {
-        Self { event_radius, ..self }
+    /// With kernels so made for events in media.
+    pub fn with_event_kernel(self, kernel: EventKernelSettings) -> Self {
+        Self {
+            event_kernel: Some(kernel),
+            ..self
+        }
     }
 
     /// What has been traced.
@@ -254,7 +258,7 @@ struct PhotonStages<'a> {
     first: u32,
     first_event: u32,
     kernel: Option<&'a KernelSettings>,
-    event_radius: f64,
+    event_kernel: Option<&'a EventKernelSettings>,
 }
 
 impl PhotonTracer {
@@ -298,7 +302,7 @@ impl PhotonTracer {
         let quarters = append.quarters();
         let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
-        let volume = || VolumeTrace::new(gpu, &scene, plan.sampler, slots, plan.photons);
+        let volume = || VolumeTrace::new(gpu, &scene, &plan, slots);
         let volume = profile.media.any().then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
@@ -370,7 +374,7 @@ impl PhotonTracer {
         Tracing {
             pass,
             kernel: kernel.copied(),
-            event_radius: 0.0,
+            event_kernel: None,
             first_photon: 0,
             wave: None,
             traced: Traced::default(),
@@ -402,7 +406,7 @@ impl PhotonTracer {
             first: tracing.traced.records,
             first_event: tracing.traced.events,
             kernel: tracing.kernel.as_ref(),
-            event_radius: tracing.event_radius,
+            event_kernel: tracing.event_kernel.as_ref(),
         };
         self.walker.advance(wave, &mut stages)?;
         tracing.traced.timings.append(&mut wave.take_timings());
@@ -514,10 +518,10 @@ impl WalkStages for PhotonStages<'_> {
                 first_deposit: kit.stored.first_bounce,
                 last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
                 flux_scale: flux_scale(&kit.scene) as f32,
-                radius: self.event_radius as f32,
+                kernel: self.event_kernel.copied(),
             };
             recorder.pass("photon: medium", |pass| {
-                volume.record_medium(pass, bounce, &kit.scene, told)
+                volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)
             })?;
         }
         let [lower, upper] = kit.scene.bounds();
@@ -564,7 +568,7 @@ impl WalkStages for PhotonStages<'_> {
                         capacity: volume.capacity(),
                     },
                 ];
-                return volume.record_append(pass, bounce, &own, rooms);
+                return volume.record_append(pass, bounce, &kit.differentials, &own, rooms);
             }
             kit.append
                 .append(pass, bounce, &kit.scene, &own, self.first, kit.capacity)?;

@@ -10,6 +10,7 @@
 
 mod beam;
 pub mod event;
+pub mod footprint;
 mod map;
 mod trace;
 
@@ -29,6 +30,16 @@ pub enum VolumeEstimate {
     March,
 }
 
+/// How wide events' kernels are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VolumeKernel {
+    /// All alike.
+    Fixed,
+    /// As the photon's footprint is.
+    Footprint,
+}
+
 const BIAS: Bias = Bias::Consistent(
     "kernels blur events, and lose light by walls and boundaries or leak it through thin ones, until they have shrunk",
 );
@@ -39,7 +50,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-VOL-7",
         name: "beam estimate: one query of the volume map per ray, in corrected units",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Kernels of one radius; single scattering is the eye paths' by default; emissive media are refused; in a grid light from an event passes by chance, which costs noise.",
+        limits: "Single scattering is the eye paths' by default; emissive media are refused; in a grid light from an event passes by chance, which costs noise.",
         sources: &[
             sources::FABIANOWSKI_2011.at("§7.1"),
             sources::JAROSZ_2008.whole(),
@@ -102,7 +113,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PD-12",
         name: "photons that collide in media: stored with what they scatter, roulette by the albedo",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Footprints do not follow photons through media; media that scatter nothing have no collisions.",
+        limits: "Media that scatter nothing have no collisions.",
         sources: &[
             sources::FABIANOWSKI_2011.at("§3.4.1.3 and §7.2.3"),
             sources::JENSEN_CHRISTENSEN_1998.whole(),
@@ -119,6 +130,27 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::threads_never_show_in_media",
         ],
         settings: &["photons"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-DE-7",
+        name: "kernels in media as wide as footprints, dampened by a logarithm",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Isotropic, whatever the footprint's form; in grids what has passed is reckoned from the bounds of the density; the unit of the dampening is a ninth of the scene's diagonal, not a metre.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.2, §7.3.1 and §7.3.2")],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/photon_footprint.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::volumes_are_reciprocals_of_the_density_of_collisions",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::dampening_has_its_published_values",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::scattering_keeps_the_expected_volume",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::scaling_the_scene_and_the_unit_scales_the_kernel",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::footprints_without_a_volume_have_the_least_kernel_and_endless_ones_the_greatest",
+            "tests/tests/photon/volume.rs::kernels_from_footprints_hold_as_many_collisions_as_they_should",
+            "tests/tests/photon/volume.rs::kernels_from_footprints_agree_with_the_path_tracer",
+            "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
+        ],
+        settings: &["volume_kernel", "volume_spread", "volume_dampening"],
         ..Row::of(file!())
     },
 ];

@@ -4,15 +4,17 @@
 //! `photon_volume_append`.
 
 use super::event::{EventWords, MEDIUM_WORD};
+use super::footprint::EventKernelSettings;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, EVENT_QUARTERS, NO_MEDIUM};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::sets::{PhotonVolumeSet, PhotonWave};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_medium, photon_volume_append, photon_volume_flags};
+use crate::gpu::shaders::types;
 use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, TexelView};
 use crate::kernels::{Count, Scan, ScanBuffers, ScanOptions};
+use crate::techniques::photon_mapping::PhotonPlan;
 use crate::transport::GpuScene;
-use crate::transport::random::SamplerKind;
 use crate::walk::{Bounce, WalkKey, stage_barrier};
 use crate::{Error, Result};
 
@@ -29,8 +31,7 @@ pub(in crate::techniques::photon_mapping) struct VolumePass {
     pub last_bounce: u32,
     /// Of fluxes as they are stored.
     pub flux_scale: f32,
-    /// Of kernels, m.
-    pub radius: f32,
+    pub kernel: Option<EventKernelSettings>,
 }
 
 /// Where records of a wave begin, and how many there is room for.
@@ -61,11 +62,11 @@ pub(in crate::techniques::photon_mapping) struct VolumeTrace {
 }
 
 impl VolumeTrace {
-    /// For waves of up to `slots` of `photons` in a pass.
+    /// For waves of up to `slots` photons.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::LimitExceeded`] for media of numbers that records cannot hold.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, sampler: SamplerKind, slots: u32, photons: u32) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, plan: &PhotonPlan, slots: u32) -> Result<Self> {
         let profile = scene.profile();
         let media = profile.media.count as u64;
         if media > u64::from(EVENT_MEDIUM_MASK) {
@@ -81,14 +82,15 @@ impl VolumeTrace {
             has_instances: profile.keeps_instances,
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
-            sampler_kind: sampler as u32,
+            sampler_kind: plan.sampler as u32,
+            has_differentials: plan.follows_footprints,
             ..Default::default()
         };
         let work = |name: &str, bytes: u64| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
         let words = |name: &str| work(name, u64::from(slots) * size_of::<u32>() as u64);
         let scan = Scan::new(gpu, ScanOptions::default())?;
         let bytes = size_of::<Counters>() as u64;
-        let capacity = (u64::from(photons) * EVENTS_PER_PHOTON).min(events_of_device(gpu)) as u32;
+        let capacity = (u64::from(plan.photons) * EVENTS_PER_PHOTON).min(events_of_device(gpu)) as u32;
         Ok(Self {
             medium: gpu.compute_pipeline(&medium)?,
             flags: gpu.compute_pipeline(&Default::default())?,
@@ -119,7 +121,7 @@ impl VolumeTrace {
         &self.events
     }
 
-    fn set(&self) -> PhotonVolumeSet<'_> {
+    fn set<'a>(&'a self, differentials: &'a Buffer) -> PhotonVolumeSet<'a> {
         PhotonVolumeSet {
             photon_medium_counters: self.counters.view(),
             photon_volume_queue: self.queue.view(),
@@ -127,6 +129,7 @@ impl VolumeTrace {
             photon_volume_flags: self.flag_words.view(),
             photon_volume_ranks: self.ranks.view(),
             photon_volume_records: self.events.buffer().view(),
+            photon_medium_differentials: differentials.view(),
         }
     }
 
@@ -142,17 +145,25 @@ impl VolumeTrace {
         pass: &mut Pass<'_>,
         bounce: &Bounce<'_>,
         scene: &GpuScene,
+        differentials: &Buffer,
         told: VolumePass,
     ) -> Result<()> {
+        let kernel = told.kernel.map_or_else(Default::default, |kernel| types::EventKernelSettings {
+            spread: kernel.spread as f32,
+            dampening: kernel.dampening as f32,
+            unit_length: kernel.unit_length as f32,
+            length_min: kernel.length_min as f32,
+            length_max: kernel.length_max as f32,
+        });
         let push = photon_medium::Push {
             key: told.key,
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             last_bounce: told.last_bounce,
             first_deposit: told.first_deposit,
             flux_scale: told.flux_scale,
-            radius: told.radius,
+            kernel,
         };
-        let (set, of_scene, media) = (self.set(), scene.scene_set(), scene.media_set());
+        let (set, of_scene, media) = (self.set(differentials), scene.scene_set(), scene.media_set());
         let sets: [&dyn BindingSet<'_>; 4] = [&bounce.wave, &set, &of_scene, &media];
         pass.dispatch_indirect(&self.medium, &sets, &push, bounce.places.items)?;
         stage_barrier(pass);
@@ -164,6 +175,7 @@ impl VolumeTrace {
         &self,
         pass: &mut Pass<'_>,
         bounce: &Bounce<'_>,
+        differentials: &Buffer,
         photons: &PhotonWave<'_>,
         [surfaces, events]: [Room; 2],
     ) -> Result<()> {
@@ -171,7 +183,7 @@ impl VolumeTrace {
         pass.memory_barrier(Access::COMPUTE | Access::INDIRECT_READ, Access::TRANSFER_WRITE);
         pass.update(self.waiting.view(), &[0u32])?;
         pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE | Access::INDIRECT_READ);
-        let (set, wave) = (self.set(), &bounce.wave);
+        let (set, wave) = (self.set(differentials), &bounce.wave);
         pass.dispatch_indirect(&self.flags, &[wave, &set], &(), bounce.places.waiting)?;
         stage_barrier(pass);
         let words = ScanBuffers {
