@@ -21,6 +21,7 @@ layout(local_size_x = 64) in;
 #include "transport/features.glsl"
 #include "transport/media_features.glsl"
 #include "techniques/photon_mapping/photon_event.glsl"
+#include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_eye.glsl"
 #include "accel/sphere.glsl"
 
@@ -57,6 +58,7 @@ layout(push_constant, scalar) uniform Push {
     uint first_place;    // of LINEAR
     uint first;          // of the records that a linear query goes through
     uint last;
+    uint classes[ASKING_STATES];  // by state of a path: the classes of photons that count on surfaces, and 16 bits higher those that do in media
 } push;
 
 #include "walk/draws.glsl"
@@ -80,6 +82,7 @@ struct Beam {
     vec3 reach;
     uint medium;
     SceneMedium m;
+    uint classes;   // of photons that count, a bit each, where there are classes
     uint bounce;    // scatterings between the event and the eye
     float offset;   // of the places of a march, in their distance
 };
@@ -117,6 +120,9 @@ bool compact_visit_beam(uint record) {
     vec2 approach = closest_approach(beam.origin, beam.direction, uintBitsToFloat(q0.xyz));
     uint bounces = (q0.w >> PHOTON_BOUNCE_SHIFT) + 1u + beam.bounce;
     bool counts = (q1.z & EVENT_MEDIUM_MASK) == beam.medium && approach.y < radius * radius;
+    if (HAS_CLASSES) {
+        counts = counts && (beam.classes >> (q0.w >> PHOTON_BOUNCE_SHIFT) & 1u) != 0u;
+    }
     if (COUNTS_BOUNCES) {
         counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
     }
@@ -179,6 +185,7 @@ bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool wa
     beam.to = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start);
     beam.from = max(state.start, 0.0);
     beam.bounce = asking_bounce(path);
+    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
     beam.medium = medium_inside(crossing.interior, push.surrounding);
     beam.reach = vec3(FAR_AWAY);
     bool asks = (push.volume_states >> way_state & 1u) != 0u && beam.medium != NO_MEDIUM;
@@ -234,6 +241,7 @@ void resume_beam(uint slot, uint place, WalkState path) {
     beam.to = way.end;
     beam.reach = way.reach;
     beam.bounce = asking_bounce(path);
+    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
     beam.medium = medium_inside(crossing.interior, push.surrounding);
     beam.m = load_medium(beam.medium);
 }

@@ -7,6 +7,11 @@
 
 layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
 
+// States of a path that may ask where the path set is an expression.
+const uint ASKING_STATES = 7u;
+const uint CLASSES_ON_SURFACES = 0xFFFFu;
+const uint CLASSES_IN_MEDIA_SHIFT = 16u;
+
 // How often the path has been scattered, and the state of its automaton.
 uint asking_bounce(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
 uint asking_state(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }

@@ -32,6 +32,7 @@ struct Gather {
     Bsdf bsdf;
     CosineLobes lobes;
     uint bounce;      // scatterings between the point and the eye
+    uint classes;     // of photons that count, a bit each, where there are classes
     bool caustics;    // photons that were never scattered diffusely are the only ones that count
 };
 Gather gather;
@@ -80,6 +81,7 @@ layout(push_constant, scalar) uniform Push {
     uint first_place;     // of LINEAR
     uint first;           // of the records that a linear query goes through
     uint last;
+    uint classes[ASKING_STATES];  // by state of a path: those that count on surfaces, and 16 bits higher those that do in media
 } push;
 
 // Where all photons are scattered alike, up to their kernels.
@@ -101,6 +103,9 @@ bool compact_visit_point(uint record) {
         weight = photon_weight(PROFILE, q0, q1, q2, gather.position, gather.facing, PHOTON_NORMAL_COS_MIN);
     }
     if (TELLS_CAUSTICS && gather.caustics && photon_is_diffused(q0)) {
+        weight = 0.0;
+    }
+    if (HAS_CLASSES && (gather.classes >> photon_bounce(q1) & 1u) == 0u) {
         weight = 0.0;
     }
     if (COUNTS_BOUNCES) {
@@ -198,6 +203,7 @@ bool begin_gather(uint slot, uint place, out vec3 throughput) {
     gather.facing = a.facing;
     gather.z = arrival_normal(a);
     gather.lobes = cosine_lobes(gather.bsdf, max(dot(a.wo, gather.z), 0.0), false, LOBE_DIFFUSE);
+    gather.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] & CLASSES_ON_SURFACES : 0u;
     gather.caustics = (push.caustic_states >> asking_state(path) & 1u) != 0u;
     return true;
 }

@@ -6,6 +6,9 @@
 const uint PHOTON_UNDIFFUSED = 0u;
 const uint PHOTON_DIFFUSED = 1u;
 
+// Where the path set is an expression the state is the photon's class instead (techniques/photon_mapping/path_classes), and stands for the number of scatterings in its record, too.
+const uint PHOTON_CLASSES = 15u;
+
 // In the word of the normal: the photon has been scattered diffusely, or in a medium.
 const uint PHOTON_DIFFUSED_BIT = 0x40000000u;
 // In the word of the direction: how often it has been scattered before it landed, at most PHOTON_BOUNCE_MAX.

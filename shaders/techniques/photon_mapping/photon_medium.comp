@@ -31,6 +31,7 @@ layout(push_constant, scalar) uniform Push {
     uint last_bounce;    // greatest number of scatterings before a collision that is stored
     uint first_deposit;  // least
     float flux_scale;    // of fluxes as they are stored
+    uint classes[2];     // successors of each class of photons by scattering in a medium
     EventKernelSettings kernel;  // without footprints all have the greatest radius
 } push;
 
@@ -40,6 +41,9 @@ layout(push_constant, scalar) uniform Push {
 #include "transport/media_tracking.glsl"
 #include "transport/phase.glsl"
 #include "walk/survival.glsl"
+
+// Of PATH_SET_STATE_BITS each.
+const uint CLASSES_PER_WORD = 8u;
 
 // What a collision's kernel and the next footprint are made of.
 struct Footprint {
@@ -53,10 +57,11 @@ struct Footprint {
 uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, float radius) {
     atomicAdd(photon_medium_counters.events, 1u);
     uint bounce = path_set_bounce(photon.bounce);
+    uint history = HAS_CLASSES ? path_set_state(photon.bounce) : bounce;
     uvec4 q0;
     uvec4 q1;
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
-    pack_event(PhotonEvent(at, photon.direction, flux, radius, medium, bounce), q0, q1);
+    pack_event(PhotonEvent(at, photon.direction, flux, radius, medium, history), q0, q1);
     store_waiting(place, q0, q1, uvec4(0u));
     return FLAG_WAITING | FLAG_VOLUME;
 }
@@ -66,6 +71,14 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
     uint bounce = path_set_bounce(photon.bounce);
     if (bounce >= push.last_bounce) {
         return false;
+    }
+    uint after = PHOTON_DIFFUSED;
+    if (HAS_CLASSES) {
+        uint history = path_set_state(photon.bounce);
+        after = push.classes[history / CLASSES_PER_WORD] >> (PATH_SET_STATE_BITS * (history % CLASSES_PER_WORD)) & PATH_SET_DEAD;
+        if (after == PATH_SET_DEAD) {
+            return false;
+        }
     }
     float survival = walk_survival(before, photon.throughput, bounce);
     // Also ends a photon whose flux is not a number.
@@ -82,7 +95,7 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
     photon.direction = wi;
     photon.origin = at;
     photon.throughput /= survival;
-    photon.bounce = path_set_joined(bounce + 1u, PHOTON_DIFFUSED);
+    photon.bounce = path_set_joined(bounce + 1u, after);
     return true;
 }
 

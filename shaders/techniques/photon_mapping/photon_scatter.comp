@@ -63,7 +63,8 @@ void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 n
     uvec4 q2;
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, path_set_bounce(photon.bounce));
     pack_photon(PhotonRecord(point.position, normal, photon.direction, flux, kernel), q0, q1, q2);
-    add_history(path_set_bounce(photon.bounce), path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
+    uint history = HAS_CLASSES ? path_set_state(photon.bounce) : path_set_bounce(photon.bounce);
+    add_history(history, !HAS_CLASSES && path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
     store_waiting(place, q0, q1, q2);
     flags |= FLAG_WAITING;
 }
@@ -162,12 +163,18 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     ScatteringFrame frame = scattering_frame(a, normal);
     vec2 side = bounce_sample(slot, bounce, DIMENSION_SIDE);
     BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), side.x), LOBE_ALL);
-    if (TELLS_CAUSTICS && (HAS_METAL || HAS_SPECULAR_LAYER)) {
+    if ((TELLS_CAUSTICS || HAS_CLASSES) && (HAS_METAL || HAS_SPECULAR_LAYER)) {
         scattered = bsdf_label(bsdf, frame.wo, scattered, LOBE_ALL, false, side.y);
     }
     vec3 wi = frame_to_world(frame, scattered.wi);
     if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi)) {
         return false;
+    }
+    if (HAS_CLASSES) {
+        diffused = path_set_successor(photon_class_successors[diffused], scattered.flags);
+        if (diffused == PATH_SET_DEAD) {
+            return false;
+        }
     }
     vec3 flux = photon.throughput * scattered.weight;
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
@@ -194,7 +201,7 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
         walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : HAS_MEDIA ? s.around : OUTSIDE;
     }
-    if ((scattered.flags & LOBE_DIFFUSE) != 0u) {
+    if (!HAS_CLASSES && (scattered.flags & LOBE_DIFFUSE) != 0u) {
         diffused = PHOTON_DIFFUSED;
     }
     photon.throughput = flux / survival;

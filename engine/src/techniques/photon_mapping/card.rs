@@ -216,6 +216,8 @@ const ROWS: &[Row] = &[Row {
     path_set: Some("all"),
     bias: Some(BIAS),
     tests: &[
+        "engine/src/techniques/photon_mapping/path_classes.rs::eye_paths_and_maps_have_every_path_once",
+        "tests/tests/photon/volume.rs::expressions_agree_with_the_path_tracer",
         "tests/tests/photon/convergence.rs::radii_fall_at_the_rate_of_the_theory",
         "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
         "tests/tests/photon/settings.rs::parts_of_the_light_sum_to_the_whole",

@@ -3,9 +3,10 @@
 use std::sync::OnceLock;
 
 use super::map::PhotonMap;
+use super::path_classes::{ASKING_STATES, PathClasses};
 use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
-use super::volume::{Beam, BeamStage, EventMap};
+use super::volume::{Beam, BeamAsk, BeamStage, EventMap};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
@@ -72,6 +73,8 @@ pub(super) struct Gather {
     gather_states: u32,
     caustic_states: u32,
     bounces: [u32; 2],
+    /// [`PathClasses::asks`].
+    classes: [u32; ASKING_STATES],
     /// Only in scenes with media.
     beam: Option<Beam>,
 }
@@ -92,8 +95,15 @@ pub(super) struct GatherStage<'a> {
 type Counters = photon_gather::GatherCounters;
 
 impl Gather {
-    /// For eye paths of the set `eye`, up to `slots` at once.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &PhotonSettings, eye: &PathSet, slots: u32) -> Result<Self> {
+    /// For eye paths of the set `eye`, up to `slots` at once, which ask for photons of some classes where the path set is an expression.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        settings: &PhotonSettings,
+        eye: &PathSet,
+        classes: Option<&PathClasses>,
+        slots: u32,
+    ) -> Result<Self> {
         let set = &settings.path_set;
         // Photons have been scattered once before they land, and at the point that gathers them.
         let least = if settings.direct_photons { 1 } else { 2 };
@@ -119,6 +129,7 @@ impl Gather {
                     linear: $linear,
                     queue: $queue,
                     has_media,
+                    has_classes: classes.is_some(),
                     ..Default::default()
                 })
             };
@@ -142,9 +153,17 @@ impl Gather {
         } else {
             Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
         };
-        let (gather_states, caustic_states) = gathering_states(settings, eye);
-        let beam = || Beam::new(gpu, scene, settings, eye, gather_states, ask.counts_bounces, slots);
-        let beam = has_media.then(beam).transpose()?;
+        let (gather_states, caustic_states) = match classes {
+            Some(classes) => (classes.asking()[0], 0),
+            None => gathering_states(settings, eye),
+        };
+        let asking = BeamAsk {
+            eye,
+            classes,
+            surface_states: gather_states,
+            counts_bounces: ask.counts_bounces,
+        };
+        let beam = has_media.then(|| Beam::new(gpu, scene, settings, asking, slots)).transpose()?;
         let bytes = size_of::<Counters>() as u64;
         let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
         let counters_readback = gpu.buffer(&BufferDesc::readback("gather counters", bytes))?;
@@ -158,6 +177,7 @@ impl Gather {
             gather_states,
             caustic_states,
             bounces: [set.min_bounces(), set.max_bounces().unwrap_or(u32::MAX)],
+            classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
             beam,
             gpu: gpu.clone(),
         })
@@ -235,6 +255,7 @@ impl GatherStage<'_> {
             scale: self.scale,
             neighbors: self.neighbors,
             radius: self.radius,
+            classes: self.gather.classes,
             ..Default::default()
         }
     }
@@ -245,7 +266,7 @@ impl GatherStage<'_> {
             photon_map_records: &self.map.records,
             gather_counters: self.gather.counters.view(),
             photon_map_root: self.map.root.view(),
-            beam_ways: self
+            photon_beam_ways: self
                 .gather
                 .beam
                 .as_ref()

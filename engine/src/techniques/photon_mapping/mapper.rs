@@ -76,7 +76,8 @@ impl MapperCounts {
 pub struct MappedPhoton {
     /// Its record, with its flux in W.
     pub record: PhotonRecord,
-    /// How often it had been scattered, at most [`PHOTON_BOUNCE_MAX`](crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX).
+    /// How often it had been scattered, at most [`PHOTON_BOUNCE_MAX`](crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX); where the path set is an expression, the class
+    /// of its history.
     pub bounce: u32,
     /// Whether it had been scattered diffusely; told by the final gather alone.
     pub diffused: bool,
@@ -118,7 +119,7 @@ impl PhotonMapper {
     ///
     /// # Errors
     /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with media that emit, or with light from infinity in an endless one, and for a path set
-    /// that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for packets of queries on
+    /// that is neither a range of bounces nor an expression, [`Error::MissingFeature`](crate::Error::MissingFeature) for packets of queries on
     /// a device without votes, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
         gpu: &Gpu,
@@ -136,7 +137,7 @@ impl PhotonMapper {
             });
         }
         let has_media = scene.profile().media.any();
-        let eye_paths = settings.eye_paths(has_media)?;
+        let (classes, eye_paths) = (settings.classes()?, settings.eye_paths(has_media)?);
         let eye_settings = PathTracerSettings {
             path_set: eye_paths,
             sampler: settings.sampler,
@@ -150,7 +151,7 @@ impl PhotonMapper {
         let has_map = settings.needs_photons() && scene.has_lights();
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            PhotonTracer::new(gpu, Arc::clone(&scene), settings.plan(has_media), append)
+            PhotonTracer::of_classes(gpu, Arc::clone(&scene), settings.plan(has_media), append, classes.as_ref())
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
@@ -158,7 +159,7 @@ impl PhotonMapper {
         let photons = match tracer {
             Some(tracer) => Some(Photons {
                 tracer,
-                gather: Gather::new(gpu, &scene, &settings, &eye_paths, eye.slots())?,
+                gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), eye.slots())?,
                 maker: MapMaker::new(gpu, settings.map_build)?,
                 event_maps: has_media.then(|| EventMaps::new(gpu, settings.map_build)).transpose()?,
                 tracing: None,

@@ -7,6 +7,7 @@ mod device_map;
 mod gather;
 mod map;
 mod mapper;
+mod path_classes;
 mod queue;
 mod settings;
 mod tracer;

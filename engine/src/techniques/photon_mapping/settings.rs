@@ -1,6 +1,7 @@
 //! Settings of photon mapping, and the path sets of its two parts.
 
 use super::kernel::{KernelProfile, KernelSettings, KernelShape};
+use super::path_classes::PathClasses;
 use super::tracer::{PhotonPlan, Stored};
 use super::volume::footprint::{EventKernelSettings, event_step};
 use super::volume::{VolumeEstimate, VolumeKernel};
@@ -69,7 +70,7 @@ crate::settings! {
     /// Settings of photon mapping.
     pub struct PhotonSettings {
         /// Which light paths the picture contains.
-        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63";
+        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63 | an expression, without a range of bounces";
         /// More give less noise, and less bias with kernels that follow footprints.
         pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons per pass";
         /// Kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials.
@@ -295,20 +296,36 @@ impl PhotonSettings {
             .is_none_or(|max| max > u32::from(!self.direct_photons))
     }
 
+    /// How an expression's light paths are parted; `None` for a range of bounces.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for an expression beside a range of bounces, behind a final gather, and one that tells too much apart.
+    pub(super) fn classes(&self) -> Result<Option<PathClasses>> {
+        let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
+        if self.path_set == PathSet::new(min, max, PATH_SET_LOBES)? {
+            return Ok(None);
+        }
+        let refuse = |why: &str| Error::Unsupported {
+            technique: "photon".into(),
+            reasons: vec![format!("its pictures contain the paths of a range of bounces (bounces=A..B) or of an expression, but {} {why}", self.path_set)],
+        };
+        if (min, max) != (0, None) {
+            return Err(refuse("is both"));
+        }
+        if self.final_gather {
+            return Err(refuse("is none that a final gather can part"));
+        }
+        PathClasses::new(&self.path_set, self.direct_photons).map(Some).map_err(refuse)
+    }
+
     /// What eye paths gather by themselves: light seen through specular and glossy scattering, and direct light at the first diffuse surface
     /// (with a final gather, at the second too), in scenes with media also at the first scattering in a medium.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for a path set that is more than a range of bounces.
+    /// [`Error::Unsupported`] as [`classes`](PhotonSettings::classes), [`Error::Setting`] for more bounces than records can count.
     pub(super) fn eye_paths(&self, has_media: bool) -> Result<PathSet> {
-        if self.path_set != PathSet::new(self.path_set.min_bounces(), self.path_set.max_bounces(), PATH_SET_LOBES)? {
-            return Err(Error::Unsupported {
-                technique: "photon".into(),
-                reasons: vec![format!(
-                    "its pictures contain all paths of a range of bounces (bounces=A..B), but {} is more than that",
-                    self.path_set
-                )],
-            });
+        if let Some(classes) = self.classes()? {
+            return Ok(classes.eye);
         }
         let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
         if min.max(max.unwrap_or(0)) > PHOTON_BOUNCE_MAX {

@@ -12,6 +12,7 @@
 use std::sync::Arc;
 
 use super::kernel::KernelSettings;
+use super::path_classes::PathClasses;
 use super::volume::footprint::EventKernelSettings;
 use super::volume::{Room, VolumePass, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
@@ -248,6 +249,8 @@ struct Kit {
     emission: Option<TexelView>,
     /// Only in scenes with media.
     volume: Option<VolumeTrace>,
+    /// Of expressions: successors of classes, and those by scattering in media.
+    classes: Option<(Buffer, [u32; 2])>,
 }
 
 /// The stages of a wave of photons.
@@ -263,6 +266,17 @@ struct PhotonStages<'a> {
 
 impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
+        Self::of_classes(gpu, scene, plan, append, None)
+    }
+
+    /// As [`PhotonTracer::new`], of photons that are told apart by their class.
+    pub(super) fn of_classes(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        plan: PhotonPlan,
+        append: Box<dyn Append>,
+        classes: Option<&PathClasses>,
+    ) -> Result<Self> {
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let has_differentials = plan.follows_footprints;
         let emit = emission_spec!(photon_emit, scene, {
@@ -281,6 +295,7 @@ impl PhotonTracer {
             stores_lights: plan.stores_lights,
             even_survival: plan.even_survival,
             has_media: profile.media.any(),
+            has_classes: classes.is_some(),
             ..Default::default()
         });
         let wanted = plan.photons.next_multiple_of(WALK_GROUP);
@@ -302,7 +317,7 @@ impl PhotonTracer {
         let quarters = append.quarters();
         let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
-        let volume = || VolumeTrace::new(gpu, &scene, &plan, slots);
+        let volume = || VolumeTrace::new(gpu, &scene, &plan, classes.is_some(), slots);
         let volume = profile.media.any().then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
@@ -320,6 +335,13 @@ impl PhotonTracer {
                 capacity,
                 emission: scene.emission_choice(gpu)?,
                 volume,
+                classes: match classes {
+                    Some(classes) => {
+                        let words = gpu.buffer_with("photon classes", Category::Work, &classes.next)?;
+                        Some((words, classes.next_in_media()))
+                    }
+                    None => None,
+                },
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
@@ -480,6 +502,7 @@ impl Kit {
             photon_counters: self.counters.view(),
             photon_differentials: self.differentials.view(),
             photon_records: self.records.buffer().view(),
+            photon_class_successors: self.classes.as_ref().map_or(&self.counters, |(words, _)| words).view(),
         }
     }
 }
@@ -518,6 +541,7 @@ impl WalkStages for PhotonStages<'_> {
                 first_deposit: kit.stored.first_bounce,
                 last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
                 flux_scale: flux_scale(&kit.scene) as f32,
+                classes: kit.classes.as_ref().map_or([0; 2], |(_, in_media)| *in_media),
                 kernel: self.event_kernel.copied(),
             };
             recorder.pass("photon: medium", |pass| {

@@ -10,6 +10,7 @@ use crate::gpu::shaders::techniques::photon_mapping::photon_beam;
 use crate::gpu::shaders::types::BeamWay;
 use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, wide_counter};
 use crate::techniques::photon_mapping::gather::GatherCounts;
+use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
 use crate::techniques::photon_mapping::settings::PhotonSettings;
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::{Places, WalkKey, stage_barrier};
@@ -34,6 +35,8 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     states: u32,
     volume_states: u32,
     bounces: [u32; 2],
+    /// [`PathClasses::asks`].
+    classes: [u32; ASKING_STATES],
 }
 
 /// Queries of one map, to be recorded with a wave.
@@ -44,8 +47,20 @@ pub(in crate::techniques::photon_mapping) struct BeamStage<'a> {
     pub scale: f32,
 }
 
+/// Which eye paths ask, and for what.
+#[derive(Clone, Copy)]
+pub(in crate::techniques::photon_mapping) struct BeamAsk<'a> {
+    pub eye: &'a PathSet,
+    /// Of an expression.
+    pub classes: Option<&'a PathClasses>,
+    /// Of paths that ask on surfaces, a bit each.
+    pub surface_states: u32,
+    /// The path set bounds the number of scatterings.
+    pub counts_bounces: bool,
+}
+
 impl Beam {
-    /// For eye paths of the set `eye`, up to `slots` at once, of which those of `surface_states` ask on surfaces.
+    /// For up to `slots` eye paths at once.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -53,11 +68,15 @@ impl Beam {
         gpu: &Gpu,
         scene: &GpuScene,
         settings: &PhotonSettings,
-        eye: &PathSet,
-        surface_states: u32,
-        counts_bounces: bool,
+        asking: BeamAsk<'_>,
         slots: u32,
     ) -> Result<Self> {
+        let BeamAsk {
+            eye,
+            classes,
+            surface_states,
+            counts_bounces,
+        } = asking;
         let profile = scene.profile();
         let spec = |linear| photon_beam::Spec {
             has_absorption: profile.has_absorption,
@@ -70,6 +89,7 @@ impl Beam {
             marches: settings.volume == VolumeEstimate::March,
             compact_quota: settings.query_quota.min(BEAM_QUOTA),
             counts_bounces,
+            has_classes: classes.is_some(),
             linear,
             ..Default::default()
         };
@@ -82,10 +102,10 @@ impl Beam {
             ))
         };
         let bytes = size_of::<Counters>() as u64;
-        let volume_states = if settings.direct_photons {
-            surface_states
-        } else {
-            states_that_go_on_by(eye, LOBE_VOLUME.trailing_zeros())
+        let volume_states = match classes {
+            Some(classes) => classes.asking()[1],
+            None if settings.direct_photons => surface_states,
+            None => states_that_go_on_by(eye, LOBE_VOLUME.trailing_zeros()),
         };
         Ok(Self {
             gpu: gpu.clone(),
@@ -101,6 +121,7 @@ impl Beam {
                 settings.path_set.min_bounces(),
                 settings.path_set.max_bounces().unwrap_or(u32::MAX),
             ],
+            classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
         })
     }
 
@@ -128,10 +149,10 @@ impl BeamStage<'_> {
         photon_beam::Set1 {
             event_pairs: &self.map.pairs,
             event_records: &self.map.events,
-            event_root: self.map.root.view(),
+            photon_event_root: self.map.root.view(),
             beam_counters: self.beam.counters.view(),
-            beam_ways: self.beam.ways.view(),
-            beam_asked: self.beam.asked.view(),
+            photon_beam_ways: self.beam.ways.view(),
+            photon_beam_asked: self.beam.asked.view(),
         }
     }
 
@@ -144,6 +165,7 @@ impl BeamStage<'_> {
             least_bounces: self.beam.bounces[0],
             most_bounces: self.beam.bounces[1],
             scale: self.scale,
+            classes: self.beam.classes,
             ..Default::default()
         }
     }

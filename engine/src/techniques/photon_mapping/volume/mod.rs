@@ -14,7 +14,7 @@ pub mod footprint;
 mod map;
 mod trace;
 
-pub(super) use beam::{Beam, BeamStage};
+pub(super) use beam::{Beam, BeamAsk, BeamStage};
 pub(super) use map::{EventMap, EventMaps};
 pub(super) use trace::{Room, VolumePass, VolumeTrace};
 
@@ -48,7 +48,7 @@ const BIAS: Bias = Bias::Consistent(
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "PM-VOL-7",
-        name: "beam estimate: one query of the volume map per ray, in corrected units",
+        name: "beam estimate: one query of the volume map per ray, in corrected units (PM-VOL-6 are the original ones)",
         role: Role::PartOf("PM-SYS-1"),
         limits: "Single scattering is the eye paths' by default; emissive media are refused; in a grid light from an event passes by chance, which costs noise.",
         sources: &[
@@ -78,17 +78,6 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::beams_that_a_quota_stops_go_through_all_records",
         ],
         settings: &["volume", "volume_radius", "reduction"],
-        ..Row::of(file!())
-    },
-    Row {
-        id: "PM-VOL-6",
-        name: "beam estimate in its original units",
-        role: Role::Yardstick,
-        limits: "Wrong by the extinction coefficient where photons carry watts; kept to show that.",
-        sources: &[sources::JAROSZ_2008.whole(), sources::FABIANOWSKI_2011.at("§7.1")],
-        tests: &[
-            "engine/src/techniques/photon_mapping/volume/event.rs::single_scattering_has_its_constants_and_original_units_do_not",
-        ],
         ..Row::of(file!())
     },
     Row {

@@ -31,6 +31,8 @@ pub(in crate::techniques::photon_mapping) struct VolumePass {
     pub last_bounce: u32,
     /// Of fluxes as they are stored.
     pub flux_scale: f32,
+    /// Successors of classes by scattering in media, where photons have some.
+    pub classes: [u32; 2],
     pub kernel: Option<EventKernelSettings>,
 }
 
@@ -66,7 +68,7 @@ impl VolumeTrace {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::LimitExceeded`] for media of numbers that records cannot hold.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, plan: &PhotonPlan, slots: u32) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, plan: &PhotonPlan, has_classes: bool, slots: u32) -> Result<Self> {
         let profile = scene.profile();
         let media = profile.media.count as u64;
         if media > u64::from(EVENT_MEDIUM_MASK) {
@@ -84,6 +86,7 @@ impl VolumeTrace {
             has_homogeneous: profile.media.homogeneous,
             sampler_kind: plan.sampler as u32,
             has_differentials: plan.follows_footprints,
+            has_classes,
             ..Default::default()
         };
         let work = |name: &str, bytes: u64| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
@@ -161,6 +164,7 @@ impl VolumeTrace {
             last_bounce: told.last_bounce,
             first_deposit: told.first_deposit,
             flux_scale: told.flux_scale,
+            classes: told.classes,
             kernel,
         };
         let (set, of_scene, media) = (self.set(differentials), scene.scene_set(), scene.media_set());
