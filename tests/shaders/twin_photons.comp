@@ -106,17 +106,34 @@ void main() {
         uvec4 q0;
         uvec4 q1;
         pack_event(PhotonEvent(in3(0u), in3(3u), in3(6u), in1(9u), in_bits(10u), in_bits(11u)), q0, q1);
-        out_bits(0u, q0.w);
+        out_bits(0u, q1.z);
         out_bits(1u, q1.x);
-        q1.z |= in_bits(12u);
+        q0.w |= in_bits(12u);
         PhotonEvent e = unpack_event(q0, q1);
         out3(2u, e.direction);
         out3(5u, e.flux);
         out1(8u, e.radius);
         out_bits(9u, e.medium);
         out_bits(10u, e.bounce);
-        out_bits(11u, event_ends_leaf(q1) ? 1u : 0u);
+        out_bits(11u, event_ends_leaf(q0) ? 1u : 0u);
         out1(12u, ball_profile(in_bits(13u), in1(14u)));
+        break;
+    }
+    case 8u: {  // beams
+        uvec4 q0;
+        uvec4 q1;
+        pack_beam(PhotonBeam(in3(0u), in3(3u), in3(6u), in_bits(9u), in_bits(10u)), q0, q1);
+        PhotonBeam b = unpack_beam(q0, q1);
+        out_bits(0u, q0.w);
+        out_bits(1u, q1.w);
+        out_bits(2u, b.medium);
+        out_bits(3u, b.bounce);
+        BeamMeeting at = meet_beam(in3(11u), in3(14u), b.start, in3(17u));
+        out1(4u, at.t);
+        out1(5u, at.along);
+        out1(6u, at.squared);
+        out1(7u, at.sine);
+        out1(8u, line_profile(in_bits(20u), in1(21u)));
         break;
     }
     case 7u: {  // footprints in media

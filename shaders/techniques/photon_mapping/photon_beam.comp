@@ -1,18 +1,19 @@
 #version 460
-// Radiance from the volume map along eye paths' ways through media: the beam estimate, each event whose kernel the ray pierces counting at its closest point; or the
+// Radiance from the volume map along eye paths' ways through media: beams of photons, each counting where the ray passes it; or events, by the beam estimate, each event whose kernel the ray pierces counting at its closest point; or the
 // marched estimate, kernels of space at places of the ray that lie as far apart as they are wide, the first one by chance. Also what the medium leaves of light from the
 // surface that the path has met, for the surface's query behind it.
 //
 // L = sum_j K(d_j / h_j) / h_j^2 tau(t_j) p(w_j, -v) Phi_j, with Phi_j the flux that the event scatters: the corrected units of the source, where the albedo stands
-// instead of the scattering coefficient. Distances are measured from the eye, and the phase function is handed the way to the eye, -v (errata 2, 22 and 23 of the
-// digest). Transmittances are exact in homogeneous media. In a grid one delta tracking a ray finds how far light of each band comes; what lies before counts in
+// instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam.
+// Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Transmittances are exact in homogeneous media. In a grid one delta tracking a ray finds how far light of each band comes; what lies before counts in
 // full, what lies behind does not: unbiased. One that its quota stops goes on in a later dispatch, before anything is asked. Events count in their own medium alone.
 //
 // A ray's sum has the order of the map's leaves, or of its records. A query that its quota stops leaves nothing and goes through all records instead (LINEAR). A way that
 // path_medium.comp goes through in several rounds is asked for once: `beam_asked` says how far.
 //
 // PM-VOL-5, PM-VOL-7: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.2.4 and 7.1; W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate
-// for Volumetric Photon Mapping", 2008. Deterministic in (seed, pixel, sample) and the map.
+// for Volumetric Photon Mapping", 2008; W. Jarosz, D. Nowrouzezahrai, I. Sadeghi and H. W. Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon
+// Points and Beams", 2011. Deterministic in (seed, pixel, sample) and the map.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -28,6 +29,7 @@ layout(local_size_x = 64) in;
 layout(constant_id = 42) const uint PROFILE = KERNEL_EPANECHNIKOV;
 layout(constant_id = 43) const bool LINEAR = false;  // goes through records, for places that have stopped
 layout(constant_id = 47) const bool MARCHES = false;
+layout(constant_id = 55) const bool BEAMS = false;   // the map holds ways of photons
 
 layout(set = 1, binding = 0) uniform utextureBuffer event_pairs;
 layout(set = 1, binding = 1) uniform utextureBuffer event_records;
@@ -55,6 +57,7 @@ layout(push_constant, scalar) uniform Push {
     uint least_bounces;  // scatterings in all, with that of the event
     uint most_bounces;
     float scale;         // of stored fluxes
+    float radius;        // of beams
     uint first_place;    // of LINEAR
     uint first;          // of the records that a linear query goes through
     uint last;
@@ -113,15 +116,46 @@ vec3 marched(float t, float d2, float h) {
     return sum / (h * h);
 }
 
+// Adds a beam's light where the ray passes it.
+void add_beam(uvec4 q0, uvec4 q1) {
+    PhotonBeam b = unpack_beam(q0, q1);
+    vec3 way = b.end - b.start;
+    float reach = length(way);
+    uint bounces = b.bounce + 1u + beam.bounce;
+    bool counts = b.medium == beam.medium && reach > 0.0;
+    if (HAS_CLASSES) {
+        counts = counts && (beam.classes >> b.bounce & 1u) != 0u;
+    }
+    if (COUNTS_BOUNCES) {
+        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
+    }
+    if (counts) {
+        way /= reach;
+        BeamMeeting at = meet_beam(beam.origin, beam.direction, b.start, way);
+        float relative = at.squared / (push.radius * push.radius);
+        if (at.sine > 0.0 && relative < 1.0 && at.along >= 0.0 && at.along < reach && at.t > beam.from && at.t < beam.to) {
+            vec3 passed = passed_to(at.t) * transmittance(beam.m.sigma_t, at.along);
+            float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
+            weight *= phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+            ++gathered_events;
+            gathered += weight * beam.m.sigma_s * passed * b.flux;
+        }
+    }
+}
+
 bool compact_visit_beam(uint record) {
     uvec4 q0 = event_quarter(record, 0u);
     uvec4 q1 = event_quarter(record, 1u);
+    if (BEAMS) {
+        add_beam(q0, q1);
+        return !event_ends_leaf(q0);
+    }
     float radius = uintBitsToFloat(q1.y);
     vec2 approach = closest_approach(beam.origin, beam.direction, uintBitsToFloat(q0.xyz));
-    uint bounces = (q0.w >> PHOTON_BOUNCE_SHIFT) + 1u + beam.bounce;
-    bool counts = (q1.z & EVENT_MEDIUM_MASK) == beam.medium && approach.y < radius * radius;
+    uint bounces = (q1.z >> PHOTON_BOUNCE_SHIFT) + 1u + beam.bounce;
+    bool counts = (q0.w & EVENT_MEDIUM_MASK) == beam.medium && approach.y < radius * radius;
     if (HAS_CLASSES) {
-        counts = counts && (beam.classes >> (q0.w >> PHOTON_BOUNCE_SHIFT) & 1u) != 0u;
+        counts = counts && (beam.classes >> (q1.z >> PHOTON_BOUNCE_SHIFT) & 1u) != 0u;
     }
     if (COUNTS_BOUNCES) {
         counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
@@ -138,7 +172,7 @@ bool compact_visit_beam(uint record) {
             gathered += weight * phase_function(beam.m.phase, beam.m.phase_parameter, e.direction, -beam.direction) * e.flux;
         }
     }
-    return !event_ends_leaf(q1);
+    return !event_ends_leaf(q0);
 }
 
 // Finds how far light of each band comes through the grid, from `from` on; false where the quota has stopped it, at `from`.

@@ -13,17 +13,23 @@ layout(set = 0, binding = 0) uniform utextureBuffer event_records_in;
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer LbvhBoxes { ivec4 lbvh_boxes[]; };
 layout(set = 0, binding = 2, scalar) restrict buffer LbvhStateBlock { LbvhState lbvh_state; };
 
-layout(push_constant, scalar) uniform PhotonEventBoxesPush { uint count; } event_push;
+layout(constant_id = 0) const bool BEAMS = false;  // records are pieces of ways
+
+layout(push_constant, scalar) uniform PhotonEventBoxesPush {
+    uint count;
+    float radius;  // of beams, m
+} event_push;
 
 shared int group_lower[3];
 shared int group_upper[3];
 
-LbvhBox event_box(vec3 centre, float radius) {
+// The box of a kernel about a place, or about what lies between two.
+LbvhBox event_box(vec3 a, vec3 b, float radius) {
     precise float wide = radius + EVENT_SLACK * radius;
-    precise vec3 rounding = EVENT_ROUNDING * abs(centre);
-    precise vec3 half_sides = wide + rounding;
-    precise vec3 lower = centre - half_sides;
-    precise vec3 upper = centre + half_sides;
+    precise vec3 rounding = EVENT_ROUNDING * max(abs(a), abs(b));
+    precise vec3 beyond = wide + rounding;
+    precise vec3 lower = min(a, b) - beyond;
+    precise vec3 upper = max(a, b) + beyond;
     return LbvhBox(ordered_integers(lower), ordered_integers(upper));
 }
 
@@ -37,9 +43,9 @@ void main() {
     uint place = gl_WorkGroupID.x * LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION + lane;
     LbvhBox centres = LbvhBox(ivec3(0x7FFFFFFF), ivec3(int(0x80000000u)));
     for (uint i = 0u; i < LBVH_BOXES_PER_INVOCATION && place < event_push.count; ++i) {
-        uvec4 q0 = texelFetch(event_records_in, int(EVENT_QUARTERS * place));
-        float radius = uintBitsToFloat(texelFetch(event_records_in, int(EVENT_QUARTERS * place + 1u)).y);
-        LbvhBox box = event_box(uintBitsToFloat(q0.xyz), radius);
+        vec3 from = uintBitsToFloat(texelFetch(event_records_in, int(EVENT_QUARTERS * place)).xyz);
+        uvec4 q1 = texelFetch(event_records_in, int(EVENT_QUARTERS * place + 1u));
+        LbvhBox box = event_box(from, BEAMS ? uintBitsToFloat(q1.xyz) : from, BEAMS ? event_push.radius : uintBitsToFloat(q1.y));
         lbvh_boxes[LBVH_BOX_QUARTERS * place] = ivec4(box.lower, box.upper.x);
         lbvh_boxes[LBVH_BOX_QUARTERS * place + 1u] = ivec4(box.upper.yz, 0, 0);
         precise vec3 doubled = ordered_floats(box.lower) + ordered_floats(box.upper);

@@ -23,8 +23,8 @@ void main() {
     }
     uint from = EVENT_QUARTERS * texelFetch(map_order, int(place >> 2))[place & 3u];
     bool ends = place + 1u == event_push.count || texelFetch(map_retained, int(place)).x != 0u;
-    uvec4 last = texelFetch(event_records_in, int(from + 1u));
-    last.z |= ends ? EVENT_LEAF_END : 0u;
-    event_records_out[EVENT_QUARTERS * place] = texelFetch(event_records_in, int(from));
-    event_records_out[EVENT_QUARTERS * place + 1u] = last;
+    uvec4 first = texelFetch(event_records_in, int(from));
+    first.w |= ends ? EVENT_LEAF_END : 0u;
+    event_records_out[EVENT_QUARTERS * place] = first;
+    event_records_out[EVENT_QUARTERS * place + 1u] = texelFetch(event_records_in, int(from + 1u));
 }

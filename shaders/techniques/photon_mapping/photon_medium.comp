@@ -31,6 +31,7 @@ layout(push_constant, scalar) uniform Push {
     uint last_bounce;    // greatest number of scatterings before a collision that is stored
     uint first_deposit;  // least
     float flux_scale;    // of fluxes as they are stored
+    float piece;         // about how long pieces of ways are, m
     uint classes[2];     // successors of each class of photons by scattering in a medium
     EventKernelSettings kernel;  // without footprints all have the greatest radius
 } push;
@@ -42,6 +43,10 @@ layout(push_constant, scalar) uniform Push {
 #include "transport/phase.glsl"
 #include "walk/survival.glsl"
 
+// Optical depth beyond which what is left of a way is not stored: a ten millionth of its light.
+const float WAY_DEPTH = 16.0;
+// Pieces of a way, at most.
+const uint WAY_PIECES = 32u;
 // Of PATH_SET_STATE_BITS each.
 const uint CLASSES_PER_WORD = 8u;
 
@@ -52,6 +57,26 @@ struct Footprint {
     float here;    // extinction there, of what photons collide with, 1/m
     float most;    // the same at the greatest density
 };
+
+// Stores the photon's way through a homogeneous medium, `reach` long.
+uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
+    uint bounce = path_set_bounce(photon.bounce);
+    vec3 extinction = mix(m.sigma_t, vec3(FAR_AWAY), equal(m.sigma_t, vec3(0.0)));
+    reach = min(reach, WAY_DEPTH / min(extinction.x, min(extinction.y, extinction.z)));
+    uint pieces = uint(clamp(ceil(reach / push.piece), 1.0, float(WAY_PIECES)));
+    atomicAdd(photon_medium_counters.events, pieces);
+    PhotonWay way;
+    way.start = photon.origin + start * photon.direction;
+    way.reach = reach;
+    way.direction = photon.direction;
+    way.medium = medium;
+    way.flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
+    way.bounce = HAS_CLASSES ? path_set_state(photon.bounce) : bounce;
+    way.sigma_t = m.sigma_t;
+    way.pieces = pieces;
+    photon_ways[place] = way;
+    return FLAG_WAITING | FLAG_VOLUME;
+}
 
 // Stores a collision at `at`, after which the photon has the flux that is scattered.
 uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, float radius) {
@@ -129,6 +154,7 @@ void main() {
     uint medium = medium_inside(crossing.interior, push.surrounding);
     vec3 weight = vec3(1.0);
     uint outcome = GRID_LEFT;
+    uint flags = 0u;
     SceneMedium m;
     float t = 0.0;  // of a collision, or of a stop, along the ray
     float passed = 1.0;  // share of photons that come as far, of those that began the way
@@ -137,6 +163,10 @@ void main() {
         m = load_medium(medium);
         bool passes = m.sigma_s == vec3(0.0);
         uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
+        if (STORES_WAYS && !passes && photon.throughput != vec3(0.0) && path_set_bounce(photon.bounce) >= push.first_deposit) {
+            float begin = max(state.start, 0.0);
+            flags = deposit_way(slot, place, photon, medium, m, begin, end >= FAR_AWAY ? FAR_AWAY : end - begin);
+        }
         if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
             float t_max = end >= FAR_AWAY ? FAR_AWAY : end - state.start;
             if (passes) {
@@ -185,7 +215,6 @@ void main() {
     bool handled = true;
     bool alive = false;
     uint interior = crossing.interior;
-    uint flags = 0u;
     vec3 before = photon.throughput;
     photon.throughput *= weight;
     if (outcome == GRID_COLLIDED) {
@@ -197,7 +226,7 @@ void main() {
                 f.across = footprint_across(photon_medium_differentials[slot], t, photon.direction);
                 radius = event_radius(push.kernel, f.across, f.pdf, f.most);
             }
-            if (path_set_bounce(photon.bounce) >= push.first_deposit) {
+            if (!STORES_WAYS && path_set_bounce(photon.bounce) >= push.first_deposit) {
                 flags = deposit(slot, place, photon, medium, at, radius);
             }
             alive = scatter(slot, m, before, at, f, photon);
@@ -218,7 +247,7 @@ void main() {
     }
     walk_gathered[slot].interior = interior;
     walk_medium_states[slot] = state;
-    walk_medium_events[place] = MediumEvent(weight, handled ? EVENT_HANDLED : 0u);
+    walk_medium_events[place] = MediumEvent(weight, flags | (handled ? EVENT_HANDLED : 0u));
     if (handled) {
         walk_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);
         if (alive) {

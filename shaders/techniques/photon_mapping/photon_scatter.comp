@@ -66,7 +66,7 @@ void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 n
     uint history = HAS_CLASSES ? path_set_state(photon.bounce) : path_set_bounce(photon.bounce);
     add_history(history, !HAS_CLASSES && path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
     store_waiting(place, q0, q1, q2);
-    flags |= FLAG_WAITING;
+    flags |= HAS_MEDIA ? FLAG_WAITING | FLAG_LANDED : FLAG_WAITING;
 }
 
 // What a virtual light is made of (techniques/instant_radiosity/virtual_light.glsl): power that arrives, unrounded, since it is not averaged over
@@ -226,6 +226,8 @@ void main() {
             return;
         }
         photon.throughput *= event.weight;
+        // A way that is stored.
+        flags = event.flags & (FLAG_WAITING | FLAG_VOLUME);
     }
     if (scatter(slot, place, photon, flags)) {
         flags |= FLAG_ALIVE;

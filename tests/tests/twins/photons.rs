@@ -8,7 +8,8 @@ use clerestory::techniques::photon_mapping::kernel::{
     kernel_weight, pack_photon, photon_ends_leaf, photon_kernel, photon_weight, unpack_photon,
 };
 use clerestory::techniques::photon_mapping::volume::event::{
-    PhotonEvent, ball_profile, event_ends_leaf, pack_event, unpack_event,
+    PhotonBeam, PhotonEvent, ball_profile, event_ends_leaf, line_profile, meet_beam, pack_beam, pack_event,
+    unpack_beam, unpack_event,
 };
 use clerestory::techniques::photon_mapping::volume::footprint::{
     EventKernelSettings, event_radius, footprint_across, log_of_one_plus, passed_differentials, scattered_in_medium,
@@ -488,13 +489,13 @@ fn records_of_events_agree_with_their_twins() {
             for k in 0..2 {
                 let coordinate =
                     |word: u32| i64::from((word >> (k * PHOTON_DIRECTION_BITS)) & ((1 << PHOTON_DIRECTION_BITS) - 1));
-                let step = (coordinate(result.bits(0)) - coordinate(words[0][3])).abs();
+                let step = (coordinate(result.bits(0)) - coordinate(words[1][2])).abs();
                 assert!(step <= 1, "{:?}", case.0);
             }
-            assert_eq!(result.bits(0) >> PHOTON_BOUNCE_SHIFT, words[0][3] >> PHOTON_BOUNCE_SHIFT);
+            assert_eq!(result.bits(0) >> PHOTON_BOUNCE_SHIFT, words[1][2] >> PHOTON_BOUNCE_SHIFT);
             assert_eq!(result.bits(1), words[1][0], "{:?}", case.0);
-            words[0][3] = result.bits(0);
-            words[1][2] |= case.0[12].to_bits();
+            words[1][2] = result.bits(0);
+            words[0][3] |= case.0[12].to_bits();
             let back = unpack_event(&words);
             for (i, value) in [(2, back.direction), (5, back.flux)] {
                 let off = (result.vector(i) - value.as_dvec3()).abs().max_element();
@@ -565,5 +566,49 @@ fn footprints_in_media_agree_with_their_twins() {
                 [across, log_of_one_plus(x[25])]
             ]
         });
+    });
+}
+
+#[test]
+fn beams_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(40, |r| {
+            let color = r.magnitude(-12, 8) * Vec3::new(r.unit(), r.unit(), r.unit());
+            // Clear of parallel ones, where the product cancels.
+            let [ray, way] = loop {
+                let [ray, way] = [direction(r), direction(r)];
+                if ray.cross(way).length() > 0.1 {
+                    break [ray, way];
+                }
+            };
+            let start = 4.0 * r.vector();
+            let rest = [code(r.below(1 << 20)), code(r.below(80))];
+            let mut all = list32(&[start, start + way, color], &rest);
+            all.extend(list32(&[4.0 * r.vector(), ray, way], &[code(r.below(3)), r.choose(&[0.0, 0.3, 0.98, 1.0])]));
+            all
+        });
+        let results = twin_photons(gpu, 8, &table, &[]);
+        for (case, result) in table.iter().zip(&results) {
+            let at = |i: usize| Vec3::from_slice(&case.0[i..]);
+            let x = case.0.map(f64::from);
+            let beam = PhotonBeam {
+                start: at(0),
+                end: at(3),
+                flux: at(6),
+                medium: case.0[9].to_bits(),
+                bounce: case.0[10].to_bits(),
+            };
+            let words = pack_beam(&beam);
+            assert_eq!([result.bits(0), result.bits(1)], [words[0][3], words[1][3]]);
+            let back = unpack_beam(&words);
+            assert_eq!([result.bits(2), result.bits(3)], [back.medium, back.bounce]);
+            let meeting = meet_beam(v3(&x, 11), v3(&x, 14), v3(&x, 0), v3(&x, 17));
+            // Products of lengths up to some metres over the sine's square, of at least a hundredth.
+            let near = |i: usize, value: f64| (f64::from(result.0[i]) - value).abs() <= 4e4 * U;
+            assert!(near(4, meeting.t) && near(5, meeting.along) && near(6, meeting.squared), "{:?}", case.0);
+            assert!((f64::from(result.0[7]) - meeting.sine).abs() <= 16.0 * U, "{:?}", case.0);
+            let profile = PROFILES[case.0[20].to_bits() as usize];
+            assert!((f64::from(result.0[8]) - line_profile(profile, x[21])).abs() <= 8.0 * U, "{:?}", case.0);
+        }
     });
 }
