@@ -327,12 +327,18 @@ fn what_cannot_be_is_refused_by_name() {
             final_gather: true,
             ..settings("LS+DE")
         };
-        for (settings, words) in [(settings("bounces=0..300,L[^S]*E"), "is both"), (gathered, "final gather")] {
+        for (settings, words) in [
+            (settings("bounces=0..300,L[^S]*E"), "is both"),
+            (gathered, "final gather"),
+        ] {
             let set = settings.path_set;
             let error = refuse(settings);
             assert!(matches!(&error, Error::Unsupported { .. }), "{set}: {error}");
             let text = error.to_string();
-            assert!(text.contains("range of bounces") && text.contains(words), "{set}: {text}");
+            assert!(
+                text.contains("range of bounces") && text.contains(words),
+                "{set}: {text}"
+            );
         }
         // Media that shine, by the scene.
         let smoke = builtin("builtin:smoke?emission=1");

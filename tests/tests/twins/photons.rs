@@ -492,7 +492,10 @@ fn records_of_events_agree_with_their_twins() {
                 let step = (coordinate(result.bits(0)) - coordinate(words[1][2])).abs();
                 assert!(step <= 1, "{:?}", case.0);
             }
-            assert_eq!(result.bits(0) >> PHOTON_BOUNCE_SHIFT, words[1][2] >> PHOTON_BOUNCE_SHIFT);
+            assert_eq!(
+                result.bits(0) >> PHOTON_BOUNCE_SHIFT,
+                words[1][2] >> PHOTON_BOUNCE_SHIFT
+            );
             assert_eq!(result.bits(1), words[1][0], "{:?}", case.0);
             words[1][2] = result.bits(0);
             words[0][3] |= case.0[12].to_bits();
@@ -502,7 +505,10 @@ fn records_of_events_agree_with_their_twins() {
                 assert!(off <= 8.0 * U * f64::from(value.abs().max_element()), "{:?}", case.0);
             }
             assert_eq!((result.bits(8), result.bits(9)), (event.radius.to_bits(), event.medium));
-            assert_eq!((result.bits(10), result.bits(11) == 1), (back.bounce, event_ends_leaf(&words)));
+            assert_eq!(
+                (result.bits(10), result.bits(11) == 1),
+                (back.bounce, event_ends_leaf(&words))
+            );
             let ball = ball_profile(PROFILES[case.0[13].to_bits() as usize], x[14]);
             assert!((f64::from(result.0[12]) - ball).abs() <= 8.0 * U, "{:?}", case.0);
         }
@@ -545,27 +551,34 @@ fn footprints_in_media_agree_with_their_twins() {
         });
         let results = twin_photons(gpu, 7, &table, &[]);
         // Powers of a third and logarithms.
-        judge("footprints in media", &table, &results, ulps(64.0, 16.0, 0.0), 26, |x| {
-            let d = differentials(x, 0);
-            let settings = EventKernelSettings {
-                spread: x[12],
-                dampening: x[13],
-                unit_length: x[14],
-                length_min: x[15],
-                length_max: x[16],
-            };
-            let across = footprint_across(&d, x[17], v3(x, 18));
-            let scattered = scattered_in_medium(across, x[21], x[22], x[23], v3(x, 18), x[24]);
-            list![
-                [
-                    event_radius(&settings, across, x[21], x[22]),
-                    scattered.z1.length(),
-                    scattered.w2.length()
-                ],
-                passed_differentials(&d, x[23]).z2.to_array(),
-                [across, log_of_one_plus(x[25])]
-            ]
-        });
+        judge(
+            "footprints in media",
+            &table,
+            &results,
+            ulps(64.0, 16.0, 0.0),
+            26,
+            |x| {
+                let d = differentials(x, 0);
+                let settings = EventKernelSettings {
+                    spread: x[12],
+                    dampening: x[13],
+                    unit_length: x[14],
+                    length_min: x[15],
+                    length_max: x[16],
+                };
+                let across = footprint_across(&d, x[17], v3(x, 18));
+                let scattered = scattered_in_medium(across, x[21], x[22], x[23], v3(x, 18), x[24]);
+                list![
+                    [
+                        event_radius(&settings, across, x[21], x[22]),
+                        scattered.z1.length(),
+                        scattered.w2.length()
+                    ],
+                    passed_differentials(&d, x[23]).z2.to_array(),
+                    [across, log_of_one_plus(x[25])]
+                ]
+            },
+        );
     });
 }
 
@@ -584,7 +597,10 @@ fn beams_agree_with_their_twins() {
             let start = 4.0 * r.vector();
             let rest = [code(r.below(1 << 20)), code(r.below(80))];
             let mut all = list32(&[start, start + way, color], &rest);
-            all.extend(list32(&[4.0 * r.vector(), ray, way], &[code(r.below(3)), r.choose(&[0.0, 0.3, 0.98, 1.0])]));
+            all.extend(list32(
+                &[4.0 * r.vector(), ray, way],
+                &[code(r.below(3)), r.choose(&[0.0, 0.3, 0.98, 1.0])],
+            ));
             all
         });
         let results = twin_photons(gpu, 8, &table, &[]);
@@ -605,10 +621,22 @@ fn beams_agree_with_their_twins() {
             let meeting = meet_beam(v3(&x, 11), v3(&x, 14), v3(&x, 0), v3(&x, 17));
             // Products of lengths up to some metres over the sine's square, of at least a hundredth.
             let near = |i: usize, value: f64| (f64::from(result.0[i]) - value).abs() <= 4e4 * U;
-            assert!(near(4, meeting.t) && near(5, meeting.along) && near(6, meeting.squared), "{:?}", case.0);
-            assert!((f64::from(result.0[7]) - meeting.sine).abs() <= 16.0 * U, "{:?}", case.0);
+            assert!(
+                near(4, meeting.t) && near(5, meeting.along) && near(6, meeting.squared),
+                "{:?}",
+                case.0
+            );
+            assert!(
+                (f64::from(result.0[7]) - meeting.sine).abs() <= 16.0 * U,
+                "{:?}",
+                case.0
+            );
             let profile = PROFILES[case.0[20].to_bits() as usize];
-            assert!((f64::from(result.0[8]) - line_profile(profile, x[21])).abs() <= 8.0 * U, "{:?}", case.0);
+            assert!(
+                (f64::from(result.0[8]) - line_profile(profile, x[21])).abs() <= 8.0 * U,
+                "{:?}",
+                case.0
+            );
         }
     });
 }

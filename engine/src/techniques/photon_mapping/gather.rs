@@ -194,20 +194,20 @@ impl Gather {
     }
 
     /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
-    /// of the map of events there.
+    /// of the map of events there, whose beams have a radius, m.
     pub fn stage<'a>(
         &'a self,
         scene: &'a GpuScene,
         map: &'a PhotonMap,
-        events: Option<&'a EventMap>,
+        events: Option<(&'a EventMap, f64)>,
         scale: f64,
         (neighbors, radius): (u32, f64),
     ) -> GatherStage<'a> {
-        let scale_of_beam = scale as f32;
-        let beam = self.beam.as_ref().zip(events).map(|(beam, map)| BeamStage {
+        let beam = self.beam.as_ref().zip(events).map(|(beam, (map, radius))| BeamStage {
             beam,
             map,
-            scale: scale_of_beam,
+            scale: scale as f32,
+            radius: radius as f32,
         });
         GatherStage {
             beam,

@@ -137,6 +137,10 @@ impl PhotonMapper {
             });
         }
         let has_media = scene.profile().media.any();
+        if has_media && settings.stores_ways() && scene.profile().media.heterogeneous {
+            let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\" or \"march\"";
+            return Err(Error::setting("volume", "beams", cause));
+        }
         let (classes, eye_paths) = (settings.classes()?, settings.eye_paths(has_media)?);
         let eye_settings = PathTracerSettings {
             path_set: eye_paths,
@@ -151,7 +155,8 @@ impl PhotonMapper {
         let has_map = settings.needs_photons() && scene.has_lights();
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            PhotonTracer::of_classes(gpu, Arc::clone(&scene), settings.plan(has_media), append, classes.as_ref())
+            let (plan, ways) = (settings.plan(has_media), settings.stores_ways());
+            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), ways)
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
@@ -161,7 +166,7 @@ impl PhotonMapper {
                 tracer,
                 gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), eye.slots())?,
                 maker: MapMaker::new(gpu, settings.map_build)?,
-                event_maps: has_media.then(|| EventMaps::new(gpu, settings.map_build)).transpose()?,
+                event_maps: has_media.then(|| EventMaps::new(gpu, settings.map_build, settings.stores_ways())).transpose()?,
                 tracing: None,
                 map: None,
                 events: None,
@@ -293,7 +298,7 @@ impl PhotonMapper {
             };
             if let (Some(maps), Some(events)) = (&mut photons.event_maps, photons.tracer.events()) {
                 let clock = Instant::now();
-                let (map, building) = maps.make(events, traced.events)?;
+                let (map, building) = maps.make(events, traced.events, event_kernel.length_max)?;
                 seconds += clock.elapsed().as_secs_f64();
                 if let Some(building) = building {
                     let built = building.wait()?;
@@ -319,7 +324,7 @@ impl PhotonMapper {
                 ..
             }) => {
                 let nearest = (self.settings.neighbors_in(pass), kernel.length_max * kernel.unit_length);
-                Some(gather.stage(&self.scene, map, events.as_ref(), watts, nearest))
+                Some(gather.stage(&self.scene, map, events.as_ref().map(|map| (map, event_kernel.length_max)), watts, nearest))
             }
             _ => None,
         };
@@ -378,7 +383,7 @@ impl PhotonMapper {
     }
 
     /// Traces the photons of a pass, and returns their collisions with media that are stored, in the order of waves, in each of bounces and photons. The picture is
-    /// not touched, and counts go on.
+    /// not touched, and counts go on. With [`VolumeEstimate::Beams`](super::volume::VolumeEstimate::Beams) there are none.
     ///
     /// # Errors
     /// As [`PhotonMapper::step`].
@@ -391,7 +396,7 @@ impl PhotonMapper {
         let tracing = photons.tracer.begin(pass, Some(&kernel)).with_event_kernel(event_kernel);
         let traced = photons.tracer.finish(tracing)?;
         self.counts.photons += traced.counts;
-        let Some(events) = photons.tracer.events() else {
+        let Some(events) = photons.tracer.events().filter(|_| !self.settings.stores_ways()) else {
             return Ok(Vec::new());
         };
         let words: Vec<EventWords> = self.gpu.read(events.buffer().view(), traced.events as usize)?;

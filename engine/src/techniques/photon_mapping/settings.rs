@@ -108,7 +108,8 @@ crate::settings! {
         pub reduction: f32 = 2.0 / 3.0, in AboveTo(0.0, 1.0);
         /// Eye paths per pixel that query the same map.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
-        /// How photons that have collided in media are seen: under disks across each eye ray, one query for all of it, or under balls at places along it.
+        /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or whole ways, in
+        /// homogeneous media alone.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
         /// Kernels of photons in media have one radius, or that of each photon's footprint.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
@@ -215,7 +216,7 @@ impl PhotonSettings {
         }
     }
 
-    /// Radius of the kernels of events in media, m, in a pass, in a scene of that diagonal: the area of disks, or the volume of balls, falls from pass to pass as
+    /// Radius of the kernels of events in media, m, in a pass, in a scene of that diagonal: the area of disks, the width of beams or the volume of balls falls from pass to pass as
     /// [`reduction`](PhotonSettings::reduction) says.
     ///
     /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011.
@@ -236,9 +237,15 @@ impl PhotonSettings {
     fn event_shrinkage(&self, pass: u32) -> f64 {
         let shrunk = shrinkage(pass, f64::from(self.reduction));
         match self.volume {
+            VolumeEstimate::Beams => shrunk.powi(2),
             VolumeEstimate::Ray => shrunk,
             VolumeEstimate::March => shrunk.powf(2.0 / 3.0),
         }
+    }
+
+    /// Whether the ways of photons through media are stored, instead of their collisions.
+    pub(super) fn stores_ways(&self) -> bool {
+        self.volume == VolumeEstimate::Beams
     }
 
     /// Kernels of events in media in a pass, in a scene of that diagonal, m.
@@ -263,7 +270,7 @@ impl PhotonSettings {
 
     /// How photons are traced.
     pub(super) fn plan(&self, has_media: bool) -> PhotonPlan {
-        let in_media = has_media && self.volume_kernel == VolumeKernel::Footprint;
+        let in_media = has_media && self.volume_kernel == VolumeKernel::Footprint && !self.stores_ways();
         PhotonPlan {
             photons: self.photons,
             sampler: self.sampler,

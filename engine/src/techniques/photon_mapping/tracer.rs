@@ -14,7 +14,7 @@ use std::sync::Arc;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
 use super::volume::footprint::EventKernelSettings;
-use super::volume::{Room, VolumePass, VolumeTrace};
+use super::volume::{Room, VolumeOptions, VolumePass, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
@@ -39,6 +39,8 @@ const BOUNCES_PER_SUBMISSION: usize = 8;
 const RECORDS_PER_PHOTON: u64 = 4;
 /// Tells the photons' random numbers from those of eye paths.
 const PHOTON_SEED: u32 = 0x7068_6f74;
+/// Length of the pieces that ways are stored in, as a share of the diagonal of the scene's box: boxes of long ones hold much beside them.
+const WAY_PIECE_SHARE: f32 = 1.0 / 16.0;
 /// Scatterings that photons are followed through at most, so that none is followed for ever between lossless surfaces.
 const BOUNCES_MAX: u32 = 4096;
 
@@ -266,17 +268,22 @@ struct PhotonStages<'a> {
 
 impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
-        Self::of_classes(gpu, scene, plan, append, None)
+        Self::in_media(gpu, scene, plan, append, None, false)
     }
 
-    /// As [`PhotonTracer::new`], of photons that are told apart by their class.
-    pub(super) fn of_classes(
+    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep the ways instead of the collisions.
+    pub(super) fn in_media(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
         plan: PhotonPlan,
         append: Box<dyn Append>,
         classes: Option<&PathClasses>,
+        stores_ways: bool,
     ) -> Result<Self> {
+        let media = VolumeOptions {
+            has_classes: classes.is_some(),
+            stores_ways,
+        };
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let has_differentials = plan.follows_footprints;
         let emit = emission_spec!(photon_emit, scene, {
@@ -317,7 +324,7 @@ impl PhotonTracer {
         let quarters = append.quarters();
         let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
-        let volume = || VolumeTrace::new(gpu, &scene, &plan, classes.is_some(), slots);
+        let volume = || VolumeTrace::new(gpu, &scene, &plan, media, slots);
         let volume = profile.media.any().then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
@@ -447,8 +454,11 @@ impl PhotonTracer {
         let traced = &mut tracing.traced;
         let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
         let [absorbed, events] = volume.unwrap_or_default();
-        // What waits are the deposits with a kernel, and the events in media.
-        let records = u32::try_from(walked.waited - u64::from(events)).unwrap_or(u32::MAX);
+        // What waits are the deposits with a kernel, and in scenes with media what comes from these besides.
+        let records = match volume {
+            Some(_) => counters.deposits - counters.without_kernel,
+            None => u32::try_from(walked.waited).unwrap_or(u32::MAX),
+        };
         traced.records = traced.records.saturating_add(records);
         traced.events = traced.events.saturating_add(events);
         traced.counts.events += u64::from(events);
@@ -535,12 +545,14 @@ impl WalkStages for PhotonStages<'_> {
 
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let (kit, kernel) = (self.kit, self.kernel);
+        let [lower, upper] = kit.scene.bounds();
         if let Some(volume) = &kit.volume {
             let told = VolumePass {
                 key: self.key,
                 first_deposit: kit.stored.first_bounce,
                 last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
                 flux_scale: flux_scale(&kit.scene) as f32,
+                piece: WAY_PIECE_SHARE * (upper - lower).length(),
                 classes: kit.classes.as_ref().map_or([0; 2], |(_, in_media)| *in_media),
                 kernel: self.event_kernel.copied(),
             };
@@ -548,7 +560,6 @@ impl WalkStages for PhotonStages<'_> {
                 volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)
             })?;
         }
-        let [lower, upper] = kit.scene.bounds();
         let push = photon_scatter::Push {
             scene_lower: lower.to_array(),
             last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),

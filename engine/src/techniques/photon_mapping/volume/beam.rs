@@ -45,6 +45,8 @@ pub(in crate::techniques::photon_mapping) struct BeamStage<'a> {
     pub map: &'a EventMap,
     /// Of stored fluxes, in W a photon.
     pub scale: f32,
+    /// Of beams, m.
+    pub radius: f32,
 }
 
 /// Which eye paths ask, and for what.
@@ -87,6 +89,7 @@ impl Beam {
             sampler_kind: settings.sampler as u32,
             profile: settings.profile as u32,
             marches: settings.volume == VolumeEstimate::March,
+            beams: settings.volume == VolumeEstimate::Beams,
             compact_quota: settings.query_quota.min(BEAM_QUOTA),
             counts_bounces,
             has_classes: classes.is_some(),
@@ -165,6 +168,7 @@ impl BeamStage<'_> {
             least_bounces: self.beam.bounces[0],
             most_bounces: self.beam.bounces[1],
             scale: self.scale,
+            radius: self.radius,
             classes: self.beam.classes,
             ..Default::default()
         }

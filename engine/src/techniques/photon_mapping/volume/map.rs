@@ -4,7 +4,7 @@
 //!
 //! Guarantees: a ray's query visits every kernel that it pierces; the same bytes on any number of threads, by host and device.
 
-use super::event::{EventWords, MEDIUM_WORD, event_box, unpack_event};
+use super::event::{EventWords, MEDIUM_WORD, event_box, unpack_beam, unpack_event};
 use crate::accel::Aabb;
 use crate::accel::lbvh::SortedCodes;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
@@ -43,6 +43,8 @@ pub(in crate::techniques::photon_mapping) struct EventMaps {
     device: Option<DeviceEventMaps>,
     /// Of the device: more events than it can, or memory has room for, go to the host.
     or_host: bool,
+    /// Records are pieces of ways.
+    beams: bool,
 }
 
 struct DeviceEventMaps {
@@ -55,12 +57,12 @@ struct DeviceEventMaps {
 impl EventMaps {
     /// # Errors
     /// As [`Gpu::compute_pipeline`].
-    pub fn new(gpu: &Gpu, build: MapBuild) -> Result<Self> {
+    pub fn new(gpu: &Gpu, build: MapBuild, beams: bool) -> Result<Self> {
         let device = match build {
             MapBuild::Host => None,
             MapBuild::Auto | MapBuild::Device => Some(DeviceEventMaps {
                 builder: MapBuilder::new(gpu)?,
-                boxes: gpu.compute_pipeline(&Default::default())?,
+                boxes: gpu.compute_pipeline(&photon_event_boxes::Spec { beams })?,
                 leaves: gpu.compute_pipeline(&Default::default())?,
                 memory: None,
             }),
@@ -69,6 +71,7 @@ impl EventMaps {
             gpu: gpu.clone(),
             device,
             or_host: build == MapBuild::Auto,
+            beams,
         })
     }
 
@@ -80,27 +83,32 @@ impl EventMaps {
         all
     }
 
-    /// A map of the first `count` of `events`, and the submission that builds it, if the device does.
+    /// A map of the first `count` of `events`, and the submission that builds it, if the device does. Maps of beams are told their radius, m.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] for more events than the device can build over where it is to, [`Error::OutOfMemory`], [`Error::DeviceLost`].
-    pub fn make(&mut self, events: &TexelView, count: u32) -> Result<(EventMap, Option<Submission>)> {
+    pub fn make(&mut self, events: &TexelView, count: u32, radius: f64) -> Result<(EventMap, Option<Submission>)> {
+        let radius = radius as f32;
         if let Some(device) = self.device.as_mut().filter(|_| count > 0) {
-            match device.build(&self.gpu, events, count) {
+            match device.build(&self.gpu, events, count, radius) {
                 Err(Error::LimitExceeded { .. } | Error::OutOfMemory { .. }) if self.or_host => {}
                 built => return built.map(|(map, submission)| (map, Some(submission))),
             }
         }
         let words: Vec<EventWords> = self.gpu.read(events.buffer().view(), count as usize)?;
-        Ok((self.by_host(&words)?, None))
+        Ok((self.by_host(&words, radius)?, None))
     }
 
-    fn by_host(&self, events: &[EventWords]) -> Result<EventMap> {
+    fn by_host(&self, events: &[EventWords], radius: f32) -> Result<EventMap> {
         let boxes: Vec<Aabb> = events
             .par_iter()
             .map(|words| {
+                if self.beams {
+                    let beam = unpack_beam(words);
+                    return event_box(beam.start, beam.end, radius);
+                }
                 let event = unpack_event(words);
-                event_box(event.position, event.radius)
+                event_box(event.position, event.position, event.radius)
             })
             .collect();
         let sorted = SortedCodes::of_boxes(&boxes, MORTON_30_AXIS_BITS);
@@ -113,7 +121,7 @@ impl EventMaps {
         let ordered: Vec<EventWords> = leaves
             .map(|(index, ends)| {
                 let mut words = events[*index as usize];
-                words[1][MEDIUM_WORD] |= if *ends { EVENT_LEAF_END } else { 0 };
+                words[0][MEDIUM_WORD] |= if *ends { EVENT_LEAF_END } else { 0 };
                 words
             })
             .collect();
@@ -138,7 +146,13 @@ impl EventMaps {
 
 impl DeviceEventMaps {
     /// Submits the build of a map of the first `count` of `events`, at least one. It lasts until the next build.
-    fn build(&mut self, gpu: &Gpu, events: &TexelView, count: u32) -> Result<(EventMap, Submission)> {
+    fn build(
+        &mut self,
+        gpu: &Gpu,
+        events: &TexelView,
+        count: u32,
+        radius: f32,
+    ) -> Result<(EventMap, Submission)> {
         let enough = |memory: &(MapBuffers, TexelView)| memory.0.capacity() >= count;
         if !self.memory.as_ref().is_some_and(enough) {
             self.memory = None;
@@ -166,7 +180,8 @@ impl DeviceEventMaps {
                 lbvh_state_block: tree.bounds.view(),
             };
             let groups = count.div_ceil(LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION);
-            pass.dispatch(&self.boxes, &[&set], &photon_event_boxes::Push { count }, [groups, 1, 1])?;
+            let push = photon_event_boxes::Push { count, radius };
+            pass.dispatch(&self.boxes, &[&set], &push, [groups, 1, 1])?;
             pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
             Ok(())
         })?;

@@ -16,7 +16,7 @@ mod trace;
 
 pub(super) use beam::{Beam, BeamAsk, BeamStage};
 pub(super) use map::{EventMap, EventMaps};
-pub(super) use trace::{Room, VolumePass, VolumeTrace};
+pub(super) use trace::{Room, VolumeOptions, VolumePass, VolumeTrace};
 
 use crate::catalogue::{Bias, Role, Row, sources};
 
@@ -26,6 +26,8 @@ use crate::catalogue::{Bias, Role, Row, sources};
 pub enum VolumeEstimate {
     /// The beam estimate: disks across the ray, one query for all of it.
     Ray,
+    /// Beams: ways of photons through homogeneous media as far as the next surface, each seen where the ray passes it.
+    Beams,
     /// Balls at places of the ray that lie as far apart as they are wide, from a first one by chance.
     March,
 }
@@ -78,6 +80,26 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::beams_that_a_quota_stops_go_through_all_records",
         ],
         settings: &["volume", "volume_radius", "reduction"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-PHOTON-BEAMS",
+        name: "photon beams: long ones, seen by rays under kernels of one dimension",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Homogeneous media alone; a way has no light beyond sixteen mean free paths; rays along a beam are noise.",
+        sources: &[sources::JAROSZ_2011.whole(), sources::KNAUS_ZWICKER_2011.whole()],
+        bias: Some(BIAS),
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_medium.comp",
+        ],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/event.rs::beams_have_the_airlight_integral",
+            "tests/tests/photon/volume.rs::beams_have_the_six_constants",
+            "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
+            "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
+        ],
+        settings: &["volume"],
         ..Row::of(file!())
     },
     Row {

@@ -31,9 +31,20 @@ pub(in crate::techniques::photon_mapping) struct VolumePass {
     pub last_bounce: u32,
     /// Of fluxes as they are stored.
     pub flux_scale: f32,
+    /// About how long pieces of ways are, m.
+    pub piece: f32,
     /// Successors of classes by scattering in media, where photons have some.
     pub classes: [u32; 2],
     pub kernel: Option<EventKernelSettings>,
+}
+
+/// What photons in media are specialized to.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::techniques::photon_mapping) struct VolumeOptions {
+    /// The path set is an expression.
+    pub has_classes: bool,
+    /// Ways are stored instead of collisions.
+    pub stores_ways: bool,
 }
 
 /// Where records of a wave begin, and how many there is room for.
@@ -58,6 +69,8 @@ pub(in crate::techniques::photon_mapping) struct VolumeTrace {
     flag_words: Buffer,
     ranks: Buffer,
     scratch: Buffer,
+    /// Only where ways are stored: flags and ranks of deposits on surfaces, and the ways by place.
+    ways: Option<[Buffer; 3]>,
     events: TexelView,
     capacity: u32,
     slots: u32,
@@ -68,7 +81,7 @@ impl VolumeTrace {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::LimitExceeded`] for media of numbers that records cannot hold.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, plan: &PhotonPlan, has_classes: bool, slots: u32) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, plan: &PhotonPlan, options: VolumeOptions, slots: u32) -> Result<Self> {
         let profile = scene.profile();
         let media = profile.media.count as u64;
         if media > u64::from(EVENT_MEDIUM_MASK) {
@@ -86,7 +99,8 @@ impl VolumeTrace {
             has_homogeneous: profile.media.homogeneous,
             sampler_kind: plan.sampler as u32,
             has_differentials: plan.follows_footprints,
-            has_classes,
+            has_classes: options.has_classes,
+            stores_ways: options.stores_ways,
             ..Default::default()
         };
         let work = |name: &str, bytes: u64| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
@@ -96,8 +110,22 @@ impl VolumeTrace {
         let capacity = (u64::from(plan.photons) * EVENTS_PER_PHOTON).min(events_of_device(gpu)) as u32;
         Ok(Self {
             medium: gpu.compute_pipeline(&medium)?,
-            flags: gpu.compute_pipeline(&Default::default())?,
-            append: gpu.compute_pipeline(&Default::default())?,
+            flags: gpu.compute_pipeline(&photon_volume_flags::Spec {
+                stores_ways: options.stores_ways,
+            })?,
+            append: gpu.compute_pipeline(&photon_volume_append::Spec {
+                stores_ways: options.stores_ways,
+            })?,
+            ways: if options.stores_ways {
+                let bytes = u64::from(slots) * size_of::<types::PhotonWay>() as u64;
+                Some([
+                    words("photon landed flags")?,
+                    words("photon landed ranks")?,
+                    work("photon ways", bytes)?,
+                ])
+            } else {
+                None
+            },
             counters: work("photon medium counters", bytes)?,
             counters_readback: gpu.buffer(&BufferDesc::readback("photon medium counters", bytes))?,
             queue: work(
@@ -125,6 +153,7 @@ impl VolumeTrace {
     }
 
     fn set<'a>(&'a self, differentials: &'a Buffer) -> PhotonVolumeSet<'a> {
+        let of_ways = |index: usize| self.ways.as_ref().map_or(&self.counters, |ways| &ways[index]).view();
         PhotonVolumeSet {
             photon_medium_counters: self.counters.view(),
             photon_volume_queue: self.queue.view(),
@@ -133,6 +162,9 @@ impl VolumeTrace {
             photon_volume_ranks: self.ranks.view(),
             photon_volume_records: self.events.buffer().view(),
             photon_medium_differentials: differentials.view(),
+            photon_landed_flags: of_ways(0),
+            photon_landed_ranks: of_ways(1),
+            photon_ways: of_ways(2),
         }
     }
 
@@ -164,6 +196,7 @@ impl VolumeTrace {
             last_bounce: told.last_bounce,
             first_deposit: told.first_deposit,
             flux_scale: told.flux_scale,
+            piece: told.piece,
             classes: told.classes,
             kernel,
         };
@@ -201,6 +234,15 @@ impl VolumeTrace {
         };
         self.scan.record(pass, &words, count, &self.scratch)?;
         stage_barrier(pass);
+        if let Some([flags, ranks, _]) = &self.ways {
+            let words = ScanBuffers {
+                input: flags.view(),
+                heads: None,
+                output: ranks.view(),
+            };
+            self.scan.record(pass, &words, count, &self.scratch)?;
+            stage_barrier(pass);
+        }
         let push = photon_volume_append::Push {
             first: surfaces.first,
             capacity: surfaces.capacity,
