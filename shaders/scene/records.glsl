@@ -105,7 +105,7 @@ struct SceneLight {
     uint kind;
     uint triangle;
     uint around;        // material of the body that it is inside of, plus one; 0 without, and where nothing asks
-    uint spare;
+    uint spare;         // a technique's own
     vec3 position;      // point, spot
     float cos_inner;
     vec3 direction;     // spot axis, direction of travel

@@ -2,7 +2,7 @@
 #ifndef CLERESTORY_WALK_DIMENSIONS_GLSL
 #define CLERESTORY_WALK_DIMENSIONS_GLSL
 
-// A walk's start: for eye paths the first slot alone.
+// A walk's start, where it is from a light; eye paths have their pixel and lens there.
 const uint DIMENSION_START_POINT = 0u;      // light, and point of it
 const uint DIMENSION_START_DIRECTION = 1u;  // side of the light, and direction
 

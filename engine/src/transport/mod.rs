@@ -30,7 +30,7 @@ pub use gpu_scene::GpuScene;
 pub(crate) use gpu_scene::ray_iterations;
 pub use path_set::PathSet;
 pub use surface_spec::surface_spec;
-pub(crate) use surface_spec::{COMPENSATION, METAL_LOBES, SURFACE_FEATURES};
+pub(crate) use surface_spec::{COMPENSATION, METAL_LOBES, SURFACE_FEATURES, emission_spec};
 
 #[cfg(test)]
 pub(crate) mod testing;

@@ -68,9 +68,9 @@ vec3 preview_direct(uint index, Surface s, Bsdf b, mat3 axes, vec3 facing, vec3 
         return vec3(0.0);
     }
     vec3 reflected = arriving * bsdf_eval(b, wo, wi, LOBE_REFLECTION);
-    if (HAS_SHADOWS && light.spare.x != PREVIEW_NO_SHADOW && reflected != vec3(0.0)) {
+    if (HAS_SHADOWS && light.spare != PREVIEW_NO_SHADOW && reflected != vec3(0.0)) {
         float slack = dot(abs(facing), s.point.error);
-        reflected *= omni_shadow_visibility(light.spare.x, frames[push.frame].shadow_side, light.position, s.point.position, facing, slack);
+        reflected *= omni_shadow_visibility(light.spare, frames[push.frame].shadow_side, light.position, s.point.position, facing, slack);
     }
     return reflected;
 }

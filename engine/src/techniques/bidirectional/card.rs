@@ -148,6 +148,7 @@ const ROWS: &[Row] = &[
         ],
         shaders: &[
             "shaders/techniques/bidirectional/",
+            "shaders/transport/emission.glsl",
             "shaders/techniques/path/path_camera.comp",
             "shaders/techniques/path/path_resolve.comp",
             "shaders/walk/",
@@ -161,6 +162,9 @@ const ROWS: &[Row] = &[
             "tests/tests/bidirectional/agreement.rs::lights_without_area_and_skies_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::bodies_that_absorb_agree_with_the_path_tracer",
+            "engine/src/techniques/bidirectional/settings.rs::joints_need_light_subpaths_and_two_scatterings",
+            "engine/src/techniques/bidirectional/settings.rs::light_subpaths_are_as_many_as_there_is_room_for_their_vertices",
+            "engine/src/techniques/bidirectional/settings.rs::pilots_have_as_many_light_subpaths_a_pixel_as_the_picture",
             "tests/tests/bidirectional/edge_cases.rs::pictures_do_not_depend_on_how_the_work_is_cut_up",
             "tests/tests/bidirectional/edge_cases.rs::vertices_beyond_what_there_is_room_for_are_not_lost",
             "tests/tests/bidirectional/edge_cases.rs::scenes_without_lights_or_reflection_have_nothing_to_join",
@@ -197,6 +201,13 @@ const ROWS: &[Row] = &[
 mod tests {
     use super::*;
     use crate::scene;
+
+    #[test]
+    fn pilots_have_light_subpaths_as_their_picture() {
+        let settings = BidirectionalSettings::default().into();
+        let of_pilot = (CARD.foresight.pilot)(&settings, [1920, 1080], [170, 96]).unwrap();
+        assert_eq!(of_pilot.read::<BidirectionalSettings>().unwrap().light_paths, 516);
+    }
 
     #[test]
     fn caustics_behind_glass_are_said_to_be_missed_and_those_in_view_are_not() {

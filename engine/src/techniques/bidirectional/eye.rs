@@ -69,7 +69,9 @@ impl Cursor {
         let band = &bands[c.band];
         if c.band == 0 && c.in_band == 0 {
             let left = wanted.saturating_sub(c.sample);
-            c.samples = (samples_per_pass - c.sample % samples_per_pass).min(left).clamp(1, slots);
+            c.samples = (samples_per_pass - c.sample % samples_per_pass)
+                .min(left)
+                .clamp(1, slots);
         }
         let pixels = (band.pixels() - c.in_band).min(slots / c.samples);
         let wave = EyeWave {

@@ -19,8 +19,7 @@ use crate::gpu::{
     Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
 };
 use crate::scene::camera_frame::CameraFrame;
-use crate::transport::surface_spec::emission_spec;
-use crate::transport::{GpuScene, surface_spec};
+use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds, slots_of_device,
     stage_barrier,
@@ -447,7 +446,9 @@ impl WalkStages for LightStages<'_> {
     fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let walks = self.walks;
         recorder.pass("light subpaths: append", |pass| {
-            let push = bdpt_append::Push { capacity: walks.capacity };
+            let push = bdpt_append::Push {
+                capacity: walks.capacity,
+            };
             let own = walks.set();
             pass.dispatch_indirect(&walks.append, &[&bounce.wave, &own], &push, bounce.places.waiting)?;
             stage_barrier(pass);

@@ -1,4 +1,4 @@
-//! A progressive rendering by bidirectional path tracing: pass after pass, light subpaths of their own for samples_per_pass, and some eye paths a pixel, joined to them.
+//! A progressive rendering by bidirectional path tracing: pass after pass, light subpaths of their own for each, and some eye paths a pixel, joined to them.
 //!
 //! Sources: E. Lafortune, Y. Willems, "Bi-directional Path Tracing", 1993; E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", PhD thesis, 1997, chapters 9
 //! and 10; I. Georgiev, "Implementing Vertex Connection and Merging", 2012, for the partial weights; T. Davidovič, J. Křivánek, M. Hašan, P. Slusallek, "Progressive Light

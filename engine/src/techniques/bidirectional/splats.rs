@@ -135,7 +135,9 @@ pub(super) fn splats(gpu: &Gpu, vertices: u32) -> Result<Buffer> {
 /// Vertices that a buffer of the device can hold, and sums can add.
 pub(super) fn vertices_within(caps: &Caps) -> u64 {
     let quarter = size_of::<[u32; 4]>() as u64;
-    let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / quarter);
+    let quarters = caps
+        .max_texel_buffer_elements
+        .min(caps.max_storage_buffer_range / quarter);
     (quarters / u64::from(LIGHT_VERTEX_QUARTERS)).min(SPLATS_MAX)
 }
 

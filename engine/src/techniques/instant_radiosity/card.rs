@@ -177,6 +177,7 @@ const ROWS: &[Row] = &[
         limits: "Light sources are no virtual lights themselves: their light is direct light, which has shadow rays of its own.",
         sources: &[sources::KELLER_1997.whole(), sources::ENGELHARDT_2013.at("§4.5")],
         shaders: &[
+            "shaders/transport/emission.glsl",
             "shaders/techniques/photon_mapping/photon_emit.comp",
             "shaders/techniques/photon_mapping/photon_scatter.comp",
             "shaders/techniques/instant_radiosity/vpl_append.comp",

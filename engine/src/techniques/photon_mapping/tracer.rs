@@ -25,8 +25,7 @@ use crate::gpu::shaders::types::{self, Differentials};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
 use crate::gpu::{TexelView, Timings};
 use crate::transport::random::SamplerKind;
-use crate::transport::surface_spec::emission_spec;
-use crate::transport::{GpuScene, surface_spec};
+use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
     slots_of_device, stage_barrier,

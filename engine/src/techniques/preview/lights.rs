@@ -188,9 +188,9 @@ impl PreviewLights {
         let mut records = Vec::with_capacity(lights.len());
         for light in lights {
             let mut record = light_record(light);
-            record.spare = [PREVIEW_NO_SHADOW, 0];
+            record.spare = PREVIEW_NO_SHADOW;
             if self.shadows.is_some() && place_of(light).is_some() {
-                record.spare[0] = maps;
+                record.spare = maps;
                 maps += 1;
             }
             records.push(record);

@@ -61,7 +61,7 @@ pub(super) fn lamp_boxes(scene: &Scene) -> Vec<[DVec3; 2]> {
 pub(super) fn placed_box(mesh: &Mesh, instance: &Instance) -> [DVec3; 2] {
     let ends = mesh.bounds().map(|p| p.as_dvec3());
     let corner = |i: usize| {
-        let end = |axis: usize| ends[i >> axis & 1][axis];
+        let end = |axis: usize| ends[(i >> axis) & 1][axis];
         instance.transform.transform_point3(DVec3::new(end(0), end(1), end(2)))
     };
     (1..8)
@@ -152,13 +152,6 @@ impl Bodies {
     /// Material of the smallest body around each triangle, if any: that of one point for all triangles that hang together by common corners.
     fn around_pieces(&self, triangles: &[[Vec3; 3]]) -> Vec<Option<u32>> {
         let mut before: Vec<usize> = (0..triangles.len()).collect();
-        fn first_of(before: &mut [usize], mut triangle: usize) -> usize {
-            while before[triangle] != triangle {
-                before[triangle] = before[before[triangle]];
-                triangle = before[triangle];
-            }
-            triangle
-        }
         let mut at_corner = HashMap::new();
         for (i, corners) in triangles.iter().enumerate() {
             for corner in corners {
@@ -217,6 +210,15 @@ impl Body {
         self.is_near(point)
             && self.triangles.iter().map(|t| solid_angle(t, point)).sum::<f64>().abs() > std::f64::consts::TAU
     }
+}
+
+/// The first triangle of a piece, where each of its triangles names one before it, or itself.
+fn first_of(before: &mut [usize], mut triangle: usize) -> usize {
+    while before[triangle] != triangle {
+        before[triangle] = before[before[triangle]];
+        triangle = before[triangle];
+    }
+    triangle
 }
 
 fn middle(corners: &[Vec3; 3]) -> DVec3 {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::scene::{Instance, Material};
+use crate::scene::{Instance, LightKind, Material};
 use glam::DQuat;
 
 /// Meshes that are placed once and often, one that shines, one that only a plane would hold, instances of no triangles, and of one without an area.
@@ -133,6 +133,31 @@ fn meshes_without_an_area_are_flattened() {
     // Where there is nothing else, nothing is kept.
     scene.instances = scene.instances[lines].to_vec();
     assert!(Keeping::of(&scene, &profile).is_none());
+}
+
+#[test]
+fn bodies_that_absorb_are_flattened_where_a_light_may_be_inside() {
+    let mut scene = scene();
+    scene.materials[1].emission = Vec3::ZERO;
+    scene.materials[0] = Material {
+        attenuation_color: Vec3::splat(0.5),
+        ..Material::glass("tinted", 1.5)
+    };
+    let kept = |scene: &Scene| -> Vec<usize> {
+        let keeping = Keeping::of(scene, &SceneProfile::of(scene)).expect("some are kept");
+        (0..scene.instances.len()).filter(|i| keeping.instances[*i]).collect()
+    };
+    assert_eq!(kept(&scene), [1, 2, 3, 5, 7]);
+    // In the box around the mirror image alone.
+    let position = Vec3::new(1.05, -0.95, 2.05);
+    let intensity = Vec3::ONE;
+    scene.add_light("point", LightKind::Point { position, intensity });
+    assert_eq!(kept(&scene), [1, 2, 3, 7]);
+    // Lamps are in the same places as two of the others.
+    scene.materials[1].emission = Vec3::ONE;
+    assert!(Keeping::of(&scene, &SceneProfile::of(&scene)).is_none());
+    scene.materials[0].attenuation_color = Vec3::ONE;
+    assert_eq!(kept(&scene), [1, 5, 7]);
 }
 
 #[test]
