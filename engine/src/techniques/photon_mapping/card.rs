@@ -24,7 +24,14 @@ use crate::transport::{PathSet, SURFACE_FEATURES};
 pub(in crate::techniques) const CARD: Card = Card {
     id: "photon",
     summary: "progressive photon mapping: indirect light on diffuse surfaces and in media from maps of photons, rebuilt for each pass, with kernels that shrink",
-    rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS, volume::ROWS],
+    rows: &[
+        ROWS,
+        gather::ROWS,
+        kernel::ROWS,
+        queue::ROWS,
+        tracer::ROWS,
+        volume::ROWS,
+    ],
     bias: BIAS,
     needs: &[],
     kernels: &[
@@ -84,7 +91,8 @@ pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
     }
     let from_infinity = profile.has_environment() || profile.lights.directional > 0;
     if profile.media.surrounding && from_infinity {
-        let reason = "the scene has endless participating media and light from infinity, which no photon brings through them";
+        let reason =
+            "the scene has endless participating media and light from infinity, which no photon brings through them";
         reasons.push(reason.into());
     }
     reasons

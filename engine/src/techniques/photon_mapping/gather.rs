@@ -163,7 +163,9 @@ impl Gather {
             surface_states: gather_states,
             counts_bounces: ask.counts_bounces,
         };
-        let beam = has_media.then(|| Beam::new(gpu, scene, settings, asking, slots)).transpose()?;
+        let beam = has_media
+            .then(|| Beam::new(gpu, scene, settings, asking, slots))
+            .transpose()?;
         let bytes = size_of::<Counters>() as u64;
         let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
         let counters_readback = gpu.buffer(&BufferDesc::readback("gather counters", bytes))?;

@@ -166,7 +166,9 @@ impl PhotonMapper {
                 tracer,
                 gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), eye.slots())?,
                 maker: MapMaker::new(gpu, settings.map_build)?,
-                event_maps: has_media.then(|| EventMaps::new(gpu, settings.map_build, settings.stores_ways())).transpose()?,
+                event_maps: has_media
+                    .then(|| EventMaps::new(gpu, settings.map_build, settings.stores_ways()))
+                    .transpose()?,
                 tracing: None,
                 map: None,
                 events: None,
@@ -271,7 +273,12 @@ impl PhotonMapper {
         {
             let clock = Instant::now();
             let begun = photons.tracing.take();
-            let begin = || photons.tracer.begin(pass, Some(&kernel)).with_event_kernel(event_kernel);
+            let begin = || {
+                photons
+                    .tracer
+                    .begin(pass, Some(&kernel))
+                    .with_event_kernel(event_kernel)
+            };
             let mut tracing = begun.unwrap_or_else(begin);
             let all = photons.tracer.advance(&mut tracing)?;
             timings.append(&mut tracing.take_timings());
@@ -324,7 +331,13 @@ impl PhotonMapper {
                 ..
             }) => {
                 let nearest = (self.settings.neighbors_in(pass), kernel.length_max * kernel.unit_length);
-                Some(gather.stage(&self.scene, map, events.as_ref().map(|map| (map, event_kernel.length_max)), watts, nearest))
+                Some(gather.stage(
+                    &self.scene,
+                    map,
+                    events.as_ref().map(|map| (map, event_kernel.length_max)),
+                    watts,
+                    nearest,
+                ))
             }
             _ => None,
         };
@@ -393,7 +406,10 @@ impl PhotonMapper {
             return Ok(Vec::new());
         };
         photons.tracing = None;
-        let tracing = photons.tracer.begin(pass, Some(&kernel)).with_event_kernel(event_kernel);
+        let tracing = photons
+            .tracer
+            .begin(pass, Some(&kernel))
+            .with_event_kernel(event_kernel);
         let traced = photons.tracer.finish(tracing)?;
         self.counts.photons += traced.counts;
         let Some(events) = photons.tracer.events().filter(|_| !self.settings.stores_ways()) else {

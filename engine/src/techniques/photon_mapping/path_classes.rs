@@ -9,8 +9,9 @@
 //! they gather direct light alone. States of the first floor are numbered as those of the path set that they stand for are met.
 
 use crate::gpu::shaders::constants::{
-    ASKING_STATES as ASKING, CLASSES_IN_MEDIA_SHIFT, CLASSES_ON_SURFACES, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_VOLUME, PATH_SET_DEAD, PATH_SET_LOBE_COUNT,
-    PATH_SET_STATE_BITS, PATH_SET_STATES, PHOTON_CLASSES,
+    ASKING_STATES as ASKING, CLASSES_IN_MEDIA_SHIFT, CLASSES_ON_SURFACES, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
+    LOBE_SPECULAR, LOBE_VOLUME, PATH_SET_DEAD, PATH_SET_LOBE_COUNT, PATH_SET_STATE_BITS, PATH_SET_STATES,
+    PHOTON_CLASSES,
 };
 use crate::transport::PathSet;
 use std::collections::HashMap;
@@ -40,7 +41,9 @@ impl PathClasses {
     /// # Errors
     /// What there is too much of.
     pub fn new(set: &PathSet, direct: bool) -> Result<Self, &'static str> {
-        let after = |state: u32, lobe: u32| set.successors()[state as usize] >> (PATH_SET_STATE_BITS * lobe.trailing_zeros()) & PATH_SET_DEAD;
+        let after = |state: u32, lobe: u32| {
+            set.successors()[state as usize] >> (PATH_SET_STATE_BITS * lobe.trailing_zeros()) & PATH_SET_DEAD
+        };
         let lobes = || (0..PATH_SET_LOBE_COUNT).map(|symbol| 1u32 << symbol);
         // Classes: sets of states, a bit each.
         let mut known = HashMap::from([(set.accepting(), 0u32)]);
@@ -52,7 +55,9 @@ impl PathClasses {
                     let after = after(*state, lobe);
                     after != PATH_SET_DEAD && classes[class] >> after & 1 != 0
                 };
-                let states = (0..PATH_SET_STATES).filter(leads).fold(0u32, |states, state| states | 1 << state);
+                let states = (0..PATH_SET_STATES)
+                    .filter(leads)
+                    .fold(0u32, |states, state| states | 1 << state);
                 let to = if states == 0 {
                     PATH_SET_DEAD
                 } else {
@@ -105,12 +110,17 @@ impl PathClasses {
 /// The automaton of eye paths, and the states of the path set that its asking states stand for.
 fn eye_states(set: &PathSet, direct: bool) -> Result<(PathSet, Vec<u32>), &'static str> {
     let on_first_floor = |lobe: u32| lobe & (LOBE_SPECULAR | LOBE_GLOSSY) != 0;
-    let after = |state: u32, lobe: u32| set.successors()[state as usize] >> (PATH_SET_STATE_BITS * lobe.trailing_zeros()) & PATH_SET_DEAD;
+    let after = |state: u32, lobe: u32| {
+        set.successors()[state as usize] >> (PATH_SET_STATE_BITS * lobe.trailing_zeros()) & PATH_SET_DEAD
+    };
     // The first floor, then the second.
     let mut first = vec![0u32];
     let mut at = 0;
     while at < first.len() {
-        for lobe in (0..PATH_SET_LOBE_COUNT).map(|symbol| 1u32 << symbol).filter(|lobe| on_first_floor(*lobe)) {
+        for lobe in (0..PATH_SET_LOBE_COUNT)
+            .map(|symbol| 1u32 << symbol)
+            .filter(|lobe| on_first_floor(*lobe))
+        {
             let to = after(first[at], lobe);
             if to != PATH_SET_DEAD && !first.contains(&to) {
                 first.push(to);
@@ -161,13 +171,24 @@ mod tests {
 
     /// The events that come before the first place, seen from the eye, at which a map is asked, or all; from the eye on.
     fn parted(events: &[u32]) -> Option<usize> {
-        events.iter().position(|event| event & (LOBE_SPECULAR | LOBE_GLOSSY) == 0)
+        events
+            .iter()
+            .position(|event| event & (LOBE_SPECULAR | LOBE_GLOSSY) == 0)
     }
 
     #[test]
     fn eye_paths_and_maps_have_every_path_once() {
         let mut random = Random(23);
-        for text in ["L.*V.*E", "LS+VE", "LS+DE", "LD.*E", "L(S|V)*DE", "!LDE", "LV[DS]*E|LSE", "L.*E"] {
+        for text in [
+            "L.*V.*E",
+            "LS+VE",
+            "LS+DE",
+            "LD.*E",
+            "L(S|V)*DE",
+            "!LDE",
+            "LV[DS]*E|LSE",
+            "L.*E",
+        ] {
             let set: PathSet = text.parse().unwrap();
             for direct in [false, true] {
                 let classes = PathClasses::new(&set, direct).unwrap();
@@ -175,12 +196,18 @@ mod tests {
                 for _ in 0..20_000 {
                     // From the eye to the light.
                     let length = random.below(6);
-                    let events: Vec<u32> = (0..length).map(|_| 1 << random.below(PATH_SET_LOBE_COUNT as usize)).collect();
+                    let events: Vec<u32> = (0..length)
+                        .map(|_| 1 << random.below(PATH_SET_LOBE_COUNT as usize))
+                        .collect();
                     let from_light: Vec<u32> = events.iter().rev().copied().collect();
                     let by_eye = classes.eye.contains(&from_light);
                     let by_map = parted(&events).is_some_and(|place| {
                         // Transmission through a diffuse surface is asked as its reflection is: the map knows no sides.
-                        let lobe = if events[place] == LOBE_VOLUME { LOBE_VOLUME } else { SURFACE_LOBE };
+                        let lobe = if events[place] == LOBE_VOLUME {
+                            LOBE_VOLUME
+                        } else {
+                            SURFACE_LOBE
+                        };
                         if events[place] != lobe {
                             return false;
                         }
@@ -191,8 +218,7 @@ mod tests {
                             (to != PATH_SET_DEAD).then_some(to)
                         });
                         let class = events[place + 1..].iter().rev().try_fold(0u32, |class, event| {
-                            let to = classes.next[class as usize]
-                                >> (PATH_SET_STATE_BITS * event.trailing_zeros())
+                            let to = classes.next[class as usize] >> (PATH_SET_STATE_BITS * event.trailing_zeros())
                                 & PATH_SET_DEAD;
                             (to != PATH_SET_DEAD).then_some(to)
                         });
@@ -200,15 +226,19 @@ mod tests {
                         let stored = direct || place + 1 < events.len();
                         let shift = if lobe == LOBE_VOLUME { VOLUME_SHIFT } else { 0 };
                         stored
-                            && walk.zip(class).is_some_and(|(state, class)| {
-                                classes.asks[state as usize] >> (class + shift) & 1 != 0
-                            })
+                            && walk
+                                .zip(class)
+                                .is_some_and(|(state, class)| classes.asks[state as usize] >> (class + shift) & 1 != 0)
                     });
                     if parted(&events).is_some_and(|place| events[place] & (SURFACE_LOBE | LOBE_VOLUME) == 0) {
                         continue;
                     }
                     assert!(!(by_eye && by_map), "{text}, direct {direct}: {events:?} twice");
-                    assert_eq!(by_eye || by_map, set.contains(&from_light), "{text}, direct {direct}: {events:?}");
+                    assert_eq!(
+                        by_eye || by_map,
+                        set.contains(&from_light),
+                        "{text}, direct {direct}: {events:?}"
+                    );
                     inside += u32::from(set.contains(&from_light));
                     by_maps += u32::from(by_map);
                 }

@@ -314,7 +314,10 @@ impl PhotonSettings {
         }
         let refuse = |why: &str| Error::Unsupported {
             technique: "photon".into(),
-            reasons: vec![format!("its pictures contain the paths of a range of bounces (bounces=A..B) or of an expression, but {} {why}", self.path_set)],
+            reasons: vec![format!(
+                "its pictures contain the paths of a range of bounces (bounces=A..B) or of an expression, but {} {why}",
+                self.path_set
+            )],
         };
         if (min, max) != (0, None) {
             return Err(refuse("is both"));
@@ -322,7 +325,9 @@ impl PhotonSettings {
         if self.final_gather {
             return Err(refuse("is none that a final gather can part"));
         }
-        PathClasses::new(&self.path_set, self.direct_photons).map(Some).map_err(refuse)
+        PathClasses::new(&self.path_set, self.direct_photons)
+            .map(Some)
+            .map_err(refuse)
     }
 
     /// What eye paths gather by themselves: light seen through specular and glossy scattering, and direct light at the first diffuse surface

@@ -472,7 +472,11 @@ impl PhotonTracer {
             return Ok(false);
         }
         traced.counts.emitted = u64::from(self.plan.photons);
-        let events_fit = self.kit.volume.as_ref().is_none_or(|volume| traced.events <= volume.capacity());
+        let events_fit = self
+            .kit
+            .volume
+            .as_ref()
+            .is_none_or(|volume| traced.events <= volume.capacity());
         if traced.records <= self.kit.capacity && events_fit {
             return Ok(true);
         }
@@ -612,7 +616,10 @@ impl WalkStages for PhotonStages<'_> {
     }
 
     fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
-        self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.read_back(pass))?;
+        self.kit
+            .volume
+            .as_ref()
+            .map_or(Ok(()), |volume| volume.read_back(pass))?;
         pass.copy(self.kit.counters.view(), self.kit.counters_readback.view())
     }
 }

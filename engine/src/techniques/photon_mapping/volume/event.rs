@@ -6,8 +6,8 @@
 
 use crate::accel::Aabb;
 use crate::gpu::shaders::constants::{
-    BALL_CONE, BALL_EPANECHNIKOV, BALL_UNIFORM, BEAM_BOUNCE_SHIFT, EVENT_LEAF_END, EVENT_MEDIUM_MASK, EVENT_QUARTERS, EVENT_ROUNDING,
-    EVENT_SLACK, PHOTON_BOUNCE_MAX, PHOTON_BOUNCE_SHIFT, PHOTON_DIRECTION_BITS,
+    BALL_CONE, BALL_EPANECHNIKOV, BALL_UNIFORM, BEAM_BOUNCE_SHIFT, EVENT_LEAF_END, EVENT_MEDIUM_MASK, EVENT_QUARTERS,
+    EVENT_ROUNDING, EVENT_SLACK, PHOTON_BOUNCE_MAX, PHOTON_BOUNCE_SHIFT, PHOTON_DIRECTION_BITS,
 };
 use crate::maps::packed_direction::{pack_octahedral, unpack_octahedral};
 use crate::techniques::photon_mapping::kernel::KernelProfile;
@@ -40,7 +40,8 @@ pub struct PhotonEvent {
 /// The words of an event. Directions are good to 5.2·10⁻⁴ radians, flux to 2⁻⁹ of its largest band.
 pub fn pack_event(e: &PhotonEvent) -> EventWords {
     let [x, y, z] = e.position.to_array().map(f32::to_bits);
-    let way = pack_octahedral(e.direction, PHOTON_DIRECTION_BITS) | e.bounce.min(PHOTON_BOUNCE_MAX) << PHOTON_BOUNCE_SHIFT;
+    let way =
+        pack_octahedral(e.direction, PHOTON_DIRECTION_BITS) | e.bounce.min(PHOTON_BOUNCE_MAX) << PHOTON_BOUNCE_SHIFT;
     [
         [x, y, z, e.medium & EVENT_MEDIUM_MASK],
         [pack_rgb9e5(e.flux), e.radius.to_bits(), way, 0],
@@ -186,7 +187,10 @@ mod tests {
                 bounce,
             };
             let back = unpack_event(&pack_event(&event));
-            assert_eq!((back.position, back.radius, back.medium), (event.position, event.radius, event.medium));
+            assert_eq!(
+                (back.position, back.radius, back.medium),
+                (event.position, event.radius, event.medium)
+            );
             assert_eq!(back.bounce, bounce.min(PHOTON_BOUNCE_MAX));
             assert!(back.direction.angle_between(event.direction) < 6e-4);
             assert!((back.flux - event.flux).abs().max_element() <= event.flux.max_element() / 511.0);
@@ -252,7 +256,9 @@ mod tests {
         for profile in PROFILES {
             let n = 10_000;
             let place = |i: usize| (i as f64 + 0.5) / f64::from(n);
-            let all: f64 = (0..n as usize).map(|i| 2.0 * line_profile(profile, place(i).powi(2)) / f64::from(n)).sum();
+            let all: f64 = (0..n as usize)
+                .map(|i| 2.0 * line_profile(profile, place(i).powi(2)) / f64::from(n))
+                .sum();
             assert!((all - 1.0).abs() < 1e-6, "{profile:?}: {all}");
         }
         for _ in 0..1000 {
@@ -312,18 +318,26 @@ mod tests {
                 let chord = |count: usize| -> f64 {
                     let step = 2.0 / count as f64;
                     let place = |i: usize| -1.0 + (i as f64 + 0.5) * step;
-                    (0..count).map(|i| ball_profile(profile, d2 + place(i).powi(2)) * step).sum()
+                    (0..count)
+                        .map(|i| ball_profile(profile, d2 + place(i).powi(2)) * step)
+                        .sum()
                 };
                 let marched: f64 = (0..1000)
                     .map(|i| {
                         let offset = (i as f64 + 0.5) / 1000.0;
                         let first = (-(1.0f64 - d2).sqrt() - offset).ceil();
                         let place = |k: i32| first + f64::from(k) + offset;
-                        (0..3).map(|k| ball_profile(profile, d2 + place(k).powi(2))).sum::<f64>() / 1000.0
+                        (0..3)
+                            .map(|k| ball_profile(profile, d2 + place(k).powi(2)))
+                            .sum::<f64>()
+                            / 1000.0
                     })
                     .sum();
                 let exact = chord(200_000);
-                assert!((marched - exact).abs() < 2e-3 * exact, "{profile:?} {d2}: {marched} {exact}");
+                assert!(
+                    (marched - exact).abs() < 2e-3 * exact,
+                    "{profile:?} {d2}: {marched} {exact}"
+                );
             }
         }
     }
@@ -350,7 +364,8 @@ mod tests {
                     let flux = sigma_t * (-sigma_t * r).exp() / (r * r) * volume * factor;
                     let approach = closest_approach(DVec3::ZERO, DVec3::Z, position);
                     let phase = phase_function(Phase::Schlick { k: k as f32 }, way / r, -DVec3::Z * sign);
-                    let kernel = kernel_profile(KernelProfile::Epanechnikov, approach.distance_squared / (h * h)) / (h * h);
+                    let kernel =
+                        kernel_profile(KernelProfile::Epanechnikov, approach.distance_squared / (h * h)) / (h * h);
                     sum += kernel * (-sigma_t * approach.t).exp() * sigma_s / sigma_t * phase * flux;
                 }
             }
@@ -382,6 +397,9 @@ mod tests {
         assert!((original - 0.00163).abs() < 1e-5, "{original}");
         // Ten times the lengths and a tenth of the coefficients: a hundredth; the original form's factor makes it a thousandth.
         let scaled = airlight(0.0, 2.0, 1.0, 10.0, 1.0);
-        assert!((scaled * 100.0 / airlight(0.0, 2.0, 1.0, 1.0, 1.0) - 1.0).abs() < 1e-9, "{scaled}");
+        assert!(
+            (scaled * 100.0 / airlight(0.0, 2.0, 1.0, 1.0, 1.0) - 1.0).abs() < 1e-9,
+            "{scaled}"
+        );
     }
 }

@@ -145,7 +145,11 @@ mod tests {
             (10.0, 3.0, 4.399),
             (10.0, 10.0, 6.931),
         ] {
-            assert!((radius(root, d) - expected).abs() < 6e-4, "{root} {d}: {}", radius(root, d));
+            assert!(
+                (radius(root, d) - expected).abs() < 6e-4,
+                "{root} {d}: {}",
+                radius(root, d)
+            );
         }
         assert!((radius(7.0, 1e9) / 7.0 - 1.0).abs() < 1e-6 && (radius(7.0, 0.0) / 7.0 - 1.0).abs() < 1e-12);
         // The series goes over into the logarithm.
@@ -211,7 +215,10 @@ mod tests {
             let mean = sum / f64::from(n);
             let deviation = ((squares / f64::from(n) - mean * mean) / f64::from(n)).sqrt();
             // Narrow phase functions have their rarest directions, of the largest footprints, cut off.
-            assert!((mean - 1.0).abs() < 3.0 * deviation + 2e-3, "{phase:?}: {mean} ± {deviation}");
+            assert!(
+                (mean - 1.0).abs() < 3.0 * deviation + 2e-3,
+                "{phase:?}: {mean} ± {deviation}"
+            );
         }
     }
 }

@@ -146,13 +146,7 @@ impl EventMaps {
 
 impl DeviceEventMaps {
     /// Submits the build of a map of the first `count` of `events`, at least one. It lasts until the next build.
-    fn build(
-        &mut self,
-        gpu: &Gpu,
-        events: &TexelView,
-        count: u32,
-        radius: f32,
-    ) -> Result<(EventMap, Submission)> {
+    fn build(&mut self, gpu: &Gpu, events: &TexelView, count: u32, radius: f32) -> Result<(EventMap, Submission)> {
         let enough = |memory: &(MapBuffers, TexelView)| memory.0.capacity() >= count;
         if !self.memory.as_ref().is_some_and(enough) {
             self.memory = None;

@@ -6,8 +6,8 @@
 use super::event::{EventWords, MEDIUM_WORD};
 use super::footprint::EventKernelSettings;
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, EVENT_QUARTERS, NO_MEDIUM};
 use crate::gpu::interface::BindingSet;
+use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, EVENT_QUARTERS, NO_MEDIUM};
 use crate::gpu::shaders::sets::{PhotonVolumeSet, PhotonWave};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_medium, photon_volume_append, photon_volume_flags};
 use crate::gpu::shaders::types;
@@ -183,13 +183,15 @@ impl VolumeTrace {
         differentials: &Buffer,
         told: VolumePass,
     ) -> Result<()> {
-        let kernel = told.kernel.map_or_else(Default::default, |kernel| types::EventKernelSettings {
-            spread: kernel.spread as f32,
-            dampening: kernel.dampening as f32,
-            unit_length: kernel.unit_length as f32,
-            length_min: kernel.length_min as f32,
-            length_max: kernel.length_max as f32,
-        });
+        let kernel = told
+            .kernel
+            .map_or_else(Default::default, |kernel| types::EventKernelSettings {
+                spread: kernel.spread as f32,
+                dampening: kernel.dampening as f32,
+                unit_length: kernel.unit_length as f32,
+                length_min: kernel.length_min as f32,
+                length_max: kernel.length_max as f32,
+            });
         let push = photon_medium::Push {
             key: told.key,
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
