@@ -5,6 +5,7 @@
 //   bool compact_visit_point(uint record);                 for each leaf with its first record, and with the one behind it as long as it
 //                                                          returns true, if COMPACT_POINT is defined
 //   float compact_visit_ray(uint first, float t_max);      the same, returning the ray's end, if COMPACT_RAY is defined
+//   bool compact_visit_beam(uint record);                  as for points, if COMPACT_BEAM is defined: rays that meet all on their way, and end nowhere
 // Loops take at most COMPACT_QUOTA steps, each a node or a record; a query that they stop returns false.
 #ifndef CLERESTORY_ACCEL_COMPACT_BVH_GLSL
 #define CLERESTORY_ACCEL_COMPACT_BVH_GLSL
@@ -31,6 +32,11 @@ struct CompactRoot {
 // Nodes fetched and stack entries written; the caller sets them to zero.
 uvec2 compact_counters = uvec2(0u);
 
+#if defined(COMPACT_POINT) || defined(COMPACT_BEAM)
+// Nodes and records of the invocation's queries so far.
+uint compact_steps = 0u;
+#endif
+
 // Bits of the three components, x highest.
 uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z); }
 
@@ -49,9 +55,6 @@ uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z);
 #define COMPACT_LOWER(PLANES) (PLANES)
 #define COMPACT_UPPER(PLANES) (PLANES)
 #endif
-
-// Nodes and records of the invocation's queries so far.
-uint compact_steps = 0u;
 
 bool compact_point_query(CompactRoot root, vec3 point) {
     bool mine = all(lessThan(COMPACT_LOWER(root.lower), point)) && all(lessThan(point, COMPACT_UPPER(root.upper)));
@@ -103,7 +106,7 @@ bool compact_point_query(CompactRoot root, vec3 point) {
 }
 #endif
 
-#ifdef COMPACT_RAY
+#if defined(COMPACT_RAY) || defined(COMPACT_BEAM)
 #include "accel/box_test.glsl"
 
 // The part of a span in which a ray is within a box.
@@ -114,6 +117,19 @@ vec2 compact_span_within(BoxTest boxes, vec3 lower, vec3 upper, vec2 span) {
 
 bool compact_met(vec2 span) { return span.x <= span.y; }
 
+// The parts of a span in which a ray is within both children of a pair.
+void compact_spans(BoxTest boxes, uvec4 low, uvec4 high, vec2 carried, out vec2 left, out vec2 right) {
+    bvec3 lower_left = notEqual(low.www & (uvec3(4u, 2u, 1u) << COMPACT_MASK_SHIFT), uvec3(0u));
+    bvec3 upper_left = notEqual(high.www & (uvec3(4u, 2u, 1u) << COMPACT_MASK_SHIFT), uvec3(0u));
+    vec3 lower = uintBitsToFloat(low.xyz);
+    vec3 upper = uintBitsToFloat(high.xyz);
+    vec3 none = vec3(COMPACT_NO_PLANE);
+    left = compact_span_within(boxes, mix(-none, lower, lower_left), mix(none, upper, upper_left), carried);
+    right = compact_span_within(boxes, mix(lower, -none, lower_left), mix(upper, none, upper_left), carried);
+}
+#endif
+
+#ifdef COMPACT_RAY
 bool compact_ray_query(CompactRoot root, Ray ray) {
     BoxTest boxes = box_test(root.lower, root.upper, ray);
     float t_max = ray.t_max;
@@ -129,14 +145,9 @@ bool compact_ray_query(CompactRoot root, Ray ray) {
         } else {
             uvec4 low = compact_quarter(2u * next);
             uvec4 high = compact_quarter(2u * next + 1u);
-            bvec3 lower_left = notEqual(low.www & (uvec3(4u, 2u, 1u) << COMPACT_MASK_SHIFT), uvec3(0u));
-            bvec3 upper_left = notEqual(high.www & (uvec3(4u, 2u, 1u) << COMPACT_MASK_SHIFT), uvec3(0u));
-            vec3 lower = uintBitsToFloat(low.xyz);
-            vec3 upper = uintBitsToFloat(high.xyz);
-            vec3 none = vec3(COMPACT_NO_PLANE);
-            vec2 carried = vec2(span.x, min(span.y, t_max));
-            vec2 left = compact_span_within(boxes, mix(-none, lower, lower_left), mix(none, upper, upper_left), carried);
-            vec2 right = compact_span_within(boxes, mix(lower, -none, lower_left), mix(upper, none, upper_left), carried);
+            vec2 left;
+            vec2 right;
+            compact_spans(boxes, low, high, vec2(span.x, min(span.y, t_max)), left, right);
             bool meets_left = compact_met(left);
             bool meets_right = compact_met(right);
             bool right_first = right.x < left.x;
@@ -160,6 +171,52 @@ bool compact_ray_query(CompactRoot root, Ray ray) {
             }
         }
     }
+    return next == COMPACT_NOTHING;
+}
+#endif
+
+#ifdef COMPACT_BEAM
+// One loop, whose step is a node or a record, as in a point's query.
+bool compact_beam_query(CompactRoot root, Ray ray) {
+    BoxTest boxes = box_test(root.lower, root.upper, ray);
+    vec2 span = compact_span_within(boxes, root.lower, root.upper, vec2(ray.t_min, ray.t_max));
+    uint next = is_traceable(ray) && compact_met(span) ? root.reference : COMPACT_NOTHING;
+    uint stack[COMPACT_STACK_SIZE];
+    vec2 spans[COMPACT_STACK_SIZE];
+    uint top = 0u;
+    uint step = 0u;
+    for (; next != COMPACT_NOTHING && step < COMPACT_QUOTA; ++step) {
+        bool pop = true;
+        if ((next & COMPACT_LEAF_BIT) != 0u) {
+            pop = !compact_visit_beam(next ^ COMPACT_LEAF_BIT);
+            ++next;
+        } else {
+            uvec4 low = compact_quarter(2u * next);
+            uvec4 high = compact_quarter(2u * next + 1u);
+            vec2 left;
+            vec2 right;
+            compact_spans(boxes, low, high, span, left, right);
+            bool met_left = compact_met(left);
+            bool met_right = compact_met(right);
+            compact_counters.x += 2u;
+            if (met_left && met_right) {
+                stack[top] = low.w & COMPACT_REFERENCE_MASK;
+                spans[top++] = left;
+                ++compact_counters.y;
+            }
+            pop = !met_left && !met_right;
+            next = (met_right ? high.w : low.w) & COMPACT_REFERENCE_MASK;
+            span = met_right ? right : left;
+        }
+        if (pop) {
+            next = COMPACT_NOTHING;
+            if (top > 0u) {
+                next = stack[--top];
+                span = spans[top];
+            }
+        }
+    }
+    compact_steps += step;
     return next == COMPACT_NOTHING;
 }
 #endif

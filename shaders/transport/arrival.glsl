@@ -84,6 +84,14 @@ ScatteringFrame scattering_frame(Arrival a, vec3 normal) {
 vec3 world_to_frame(ScatteringFrame f, vec3 v) { return vec3(dot(v, f.x), dot(v, f.y), dot(v, f.z)); }
 vec3 frame_to_world(ScatteringFrame f, vec3 local) { return local.x * f.x + local.y * f.y + local.z * f.z; }
 
+// Least cosine by which the offset of a ray's origin counts as a way through a medium.
+const float LEAD_COS_MIN = 1.0 / 16.0;
+
+// Length of the way along `direction` that the offset of a ray's origin leaves out.
+float way_left_out(Surface s, vec3 origin, vec3 direction) {
+    return distance(origin, s.point.position) / max(abs(dot(direction, s.geometric_normal)), LEAD_COS_MIN);
+}
+
 // Where a ray that leaves along wi begins; light loses what the body absorbs of the way that this start leaves out.
 vec3 departure(Arrival a, vec3 wi, inout vec3 light) {
     SurfacePoint point = a.surface.point;

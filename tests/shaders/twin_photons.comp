@@ -6,6 +6,8 @@
 #include "twin_interface.glsl"
 
 #include "techniques/photon_mapping/kernel.glsl"
+#include "techniques/photon_mapping/photon_event.glsl"
+#include "techniques/photon_mapping/photon_footprint.glsl"
 
 Differentials in_differentials(uint i) { return Differentials(in3(i), in3(i + 3u), in3(i + 6u), in3(i + 9u)); }
 
@@ -98,6 +100,53 @@ void main() {
         q0.w |= in_bits(21u);
         out1(12u, photon_weight(in_bits(22u), q0, q1, q2, in3(18u), in3(23u), in1(26u)));
         out_bits(13u, photon_ends_leaf(q0) ? 1u : 0u);
+        break;
+    }
+    case 6u: {  // events in media
+        uvec4 q0;
+        uvec4 q1;
+        pack_event(PhotonEvent(in3(0u), in3(3u), in3(6u), in1(9u), in_bits(10u), in_bits(11u)), q0, q1);
+        out_bits(0u, q1.z);
+        out_bits(1u, q1.x);
+        q0.w |= in_bits(12u);
+        PhotonEvent e = unpack_event(q0, q1);
+        out3(2u, e.direction);
+        out3(5u, e.flux);
+        out1(8u, e.radius);
+        out_bits(9u, e.medium);
+        out_bits(10u, e.bounce);
+        out_bits(11u, event_ends_leaf(q0) ? 1u : 0u);
+        out1(12u, ball_profile(in_bits(13u), in1(14u)));
+        break;
+    }
+    case 8u: {  // beams
+        uvec4 q0;
+        uvec4 q1;
+        pack_beam(PhotonBeam(in3(0u), in3(3u), in3(6u), in_bits(9u), in_bits(10u)), q0, q1);
+        PhotonBeam b = unpack_beam(q0, q1);
+        out_bits(0u, q0.w);
+        out_bits(1u, q1.w);
+        out_bits(2u, b.medium);
+        out_bits(3u, b.bounce);
+        BeamMeeting at = meet_beam(in3(11u), in3(14u), b.start, in3(17u));
+        out1(4u, at.t);
+        out1(5u, at.along);
+        out1(6u, at.squared);
+        out1(7u, at.sine);
+        out1(8u, line_profile(in_bits(20u), in1(21u)));
+        break;
+    }
+    case 7u: {  // footprints in media
+        Differentials d = Differentials(in3(0u), in3(3u), in3(6u), in3(9u));
+        EventKernelSettings s = EventKernelSettings(in1(12u), in1(13u), in1(14u), in1(15u), in1(16u));
+        float across = footprint_across(d, in1(17u), in3(18u));
+        out1(0u, event_radius(s, across, in1(21u), in1(22u)));
+        Differentials scattered = scattered_in_medium(across, in1(21u), in1(22u), in1(23u), in3(18u), in1(24u));
+        out1(1u, length(scattered.z1));
+        out1(2u, length(scattered.w2));
+        out3(3u, passed_differentials(d, in1(23u)).z2);
+        out1(6u, across);
+        out1(7u, log_of_one_plus(in1(25u)));
         break;
     }
     }

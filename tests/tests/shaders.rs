@@ -265,7 +265,7 @@ fn no_kernel_reads_by_texels_what_it_writes() {
     ]
     .map(|name| format!("walk_{name}"));
     let of_sorts = ["keys", "values"].map(|name| format!("radix_{name}"));
-    let of_photons = ["photon_records".to_owned()];
+    let of_photons = ["event_records", "photon_records"].map(str::to_owned);
     let known = of_photons.iter().chain(&of_sorts).chain(&of_walks);
     assert!(stems.iter().eq(known), "{stems:?}");
 }

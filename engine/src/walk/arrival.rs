@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::gpu::shaders::sets::WaveSet;
+use crate::gpu::shaders::types::WalkKey;
 use crate::gpu::{BufferView, Pass, Recorder};
 
 /// A stage between arrival and scattering, for instance one that asks a map of photons.
@@ -52,7 +53,7 @@ pub trait ArrivalStage {
     ) -> Result<Option<u64>>;
 }
 
-/// The places of a wave's queue: indirect arguments of dispatches over them.
+/// The places of a wave's queue: indirect arguments of dispatches over them, and what their walks draw random numbers by.
 #[derive(Debug, Clone, Copy)]
 pub struct Places<'a> {
     /// One invocation per place.
@@ -61,6 +62,8 @@ pub struct Places<'a> {
     pub chunks: BufferView<'a>,
     /// One invocation per place where something waits, once the queues are compacted.
     pub waiting: BufferView<'a>,
+    /// What the random numbers of the wave's walks are keyed by.
+    pub key: WalkKey,
 }
 
 /// How many places an arrival stage has stopped at.
@@ -70,4 +73,6 @@ pub struct StoppedPlaces {
     pub places: u32,
     /// Places with something left to do.
     pub stopped: u32,
+    /// What the random numbers of the wave's walks are keyed by.
+    pub key: WalkKey,
 }

@@ -310,6 +310,7 @@ impl Walker {
                 items: arguments(std::mem::offset_of!(Status, item_groups)),
                 chunks: arguments(std::mem::offset_of!(Status, chunk_groups)),
                 waiting: arguments(std::mem::offset_of!(Status, waiting_groups)),
+                key,
             },
             walker: self,
             key,
@@ -325,6 +326,7 @@ impl Walker {
         let stopped = StoppedPlaces {
             places: wave.status.active_count,
             stopped: wave.stopped,
+            key: wave.key,
         };
         if part == 0 {
             arrival.prepare_stopped()?;

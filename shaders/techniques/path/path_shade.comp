@@ -25,14 +25,6 @@ layout(local_size_x = 64) in;
 // Other means have the light of edges between two rough scatterings up to this bound; paths have what it leaves out.
 layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
 
-// Least cosine by which the offset of a ray's origin counts as a way through a medium.
-const float LEAD_COS_MIN = 1.0 / 16.0;
-
-// Length of the way along `direction` that the offset of a ray's origin leaves out.
-float way_left_out(Surface s, vec3 origin, vec3 direction) {
-    return distance(origin, s.point.position) / max(abs(dot(direction, s.geometric_normal)), LEAD_COS_MIN);
-}
-
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
 

@@ -3,11 +3,8 @@
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_ASKS_GLSL
 
 #include "transport/features.glsl"
+#include "techniques/photon_mapping/photon_eye.glsl"
 #include "transport/arrival.glsl"
-#include "transport/path_set.glsl"
-#include "walk/wave.glsl"
-
-layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
 
 struct AskSettings {
     vec3 scene_lower;
@@ -15,10 +12,6 @@ struct AskSettings {
     vec3 scene_upper;
     uint most_bounces;  // scatterings in all, with that at the point
 };
-
-// How often the path has been scattered, and the state of its automaton.
-uint asking_bounce(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
-uint asking_state(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }
 
 // Whether the path at a place asks; where it has arrived, if so.
 bool asks_map(AskSettings ask, WalkState path, uint place, out Arrival arrival) {
@@ -30,10 +23,9 @@ bool asks_map(AskSettings ask, WalkState path, uint place, out Arrival arrival) 
         return false;
     }
     arrival = arrival_at(hit, path.direction, ask.scene_lower, ask.scene_upper);
-    return !arrival_is_unlit(arrival) && arrival_has_diffuse_base(arrival);
+    // Boundaries of media are no surfaces.
+    bool passed = HAS_MEDIA && (arrival.material.flags & MATERIAL_BOUNDARY) != 0u;
+    return !passed && !arrival_is_unlit(arrival) && arrival_has_diffuse_base(arrival);
 }
-
-// Whether a wave has arrived at all: no ray of it was stopped.
-bool wave_has_arrived() { return status.stalled != STALLED_EXTEND && status.stalled != STALLED_SHADOW; }
 
 #endif

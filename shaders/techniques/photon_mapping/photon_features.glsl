@@ -8,4 +8,6 @@ layout(constant_id = 41) const bool TELLS_CAUSTICS = false;    // whether a phot
 layout(constant_id = 49) const bool EVEN_SURVIVAL = false;
 layout(constant_id = 48) const bool STORES_LIGHTS = false;     // deposits become virtual lights
 
+layout(constant_id = 54) const bool HAS_CLASSES = false;       // the path set is an expression, which tells photons apart by their class
+
 #endif

@@ -21,9 +21,6 @@ layout(constant_id = 43) const bool LINEAR = false;        // goes through recor
 layout(constant_id = 45) const bool NEAREST = false;       // one kernel about the point, up to its `neighbors`-th photon
 layout(constant_id = 46) const uint QUEUE = QUEUE_SLOTS;
 
-// Stand in walk_resume for a query that its quota stopped, and for a place that has none or is done.
-const uint GATHER_STOPPED = 0xFFFFFFFEu;
-const uint GATHER_DONE = 0xFFFFFFFCu;
 // Photons count where their surface's normal is less than 60 degrees from that of the point: not through thin walls nor around corners.
 const float PHOTON_NORMAL_COS_MIN = 0.5;
 
@@ -35,6 +32,7 @@ struct Gather {
     Bsdf bsdf;
     CosineLobes lobes;
     uint bounce;      // scatterings between the point and the eye
+    uint classes;     // of photons that count, a bit each, where there are classes
     bool caustics;    // photons that were never scattered diffusely are the only ones that count
 };
 Gather gather;
@@ -70,6 +68,8 @@ bool compact_visit_point(uint record);
 
 // Beside the other bindings of the map (photon_map.glsl): in memory, so that the device may have made it.
 layout(set = 1, binding = 3, scalar) restrict readonly buffer PhotonMapRoot { CompactRoot photon_map_root; };
+// In scenes with media alone; elsewhere some other buffer is bound, and nothing is read.
+layout(set = 1, binding = 4, scalar) restrict readonly buffer PhotonBeamWays { BeamWay beam_ways[]; };
 
 layout(push_constant, scalar) uniform Push {
     AskSettings ask;
@@ -81,6 +81,7 @@ layout(push_constant, scalar) uniform Push {
     uint first_place;     // of LINEAR
     uint first;           // of the records that a linear query goes through
     uint last;
+    uint classes[ASKING_STATES];  // by state of a path: those that count on surfaces, and 16 bits higher those that do in media
 } push;
 
 // Where all photons are scattered alike, up to their kernels.
@@ -102,6 +103,9 @@ bool compact_visit_point(uint record) {
         weight = photon_weight(PROFILE, q0, q1, q2, gather.position, gather.facing, PHOTON_NORMAL_COS_MIN);
     }
     if (TELLS_CAUSTICS && gather.caustics && photon_is_diffused(q0)) {
+        weight = 0.0;
+    }
+    if (HAS_CLASSES && (gather.classes >> photon_bounce(q1) & 1u) == 0u) {
         weight = 0.0;
     }
     if (COUNTS_BOUNCES) {
@@ -186,7 +190,12 @@ bool begin_gather(uint slot, uint place, out vec3 throughput) {
         return false;
     }
     gather.bounce = asking_bounce(path);
-    if (HAS_ABSORPTION) {
+    if (HAS_MEDIA) {
+        throughput *= beam_ways[place].surface;
+        if (throughput == vec3(0.0)) {
+            return false;
+        }
+    } else if (HAS_ABSORPTION) {
         throughput = absorbed(throughput, arrival_interior(a, walk_gathered[slot].interior), a.distance);
     }
     gather.bsdf = a.bsdf;
@@ -194,6 +203,7 @@ bool begin_gather(uint slot, uint place, out vec3 throughput) {
     gather.facing = a.facing;
     gather.z = arrival_normal(a);
     gather.lobes = cosine_lobes(gather.bsdf, max(dot(a.wo, gather.z), 0.0), false, LOBE_DIFFUSE);
+    gather.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] & CLASSES_ON_SURFACES : 0u;
     gather.caustics = (push.caustic_states >> asking_state(path) & 1u) != 0u;
     return true;
 }
@@ -219,19 +229,20 @@ void main() {
     if (QUEUE != QUEUE_SLOTS) {
         place = queued_place(QUEUE, place);
     }
-    if (!wave_has_arrived() || place >= status.active_count || (LINEAR && walk_resume[place] != GATHER_STOPPED)) {
+    if (!wave_has_arrived() || place >= status.active_count
+        || (LINEAR && !(HAS_MEDIA ? gather_has_stopped(walk_resume[place]) : walk_resume[place] == GATHER_STOPPED))) {
         return;
     }
+    uint resume = walk_resume[place];
     if (!LINEAR) {
-        uint resume = walk_resume[place];
-        if (resume == GATHER_STOPPED || resume == GATHER_DONE) {
+        if (HAS_MEDIA ? !beam_is_known(resume) : resume == GATHER_STOPPED || resume == GATHER_DONE) {
             return;
         }
         if (!has_work_left()) {
             leave_for_later(STALLED_ARRIVAL);
             return;
         }
-        walk_resume[place] = GATHER_DONE;
+        walk_resume[place] = HAS_MEDIA ? gather_done(resume) : GATHER_DONE;
     }
     uint slot = load_slot(place);
     vec3 throughput;
@@ -243,7 +254,7 @@ void main() {
         count_work(QUERY_STEP_WORK * compact_steps, QUERY_STEP_WORK * WORK_UNIT);
     }
     if (!complete) {
-        walk_resume[place] = GATHER_STOPPED;
+        walk_resume[place] = HAS_MEDIA ? gather_stopped(resume) : GATHER_STOPPED;
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_ARRIVAL);
         return;

@@ -1,8 +1,20 @@
-// What a record says of the photon's way, in bits that the words of kernel.glsl leave free.
+// What is known of a photon's way, and what its record says of it, in bits that the words of kernel.glsl leave free.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_HISTORY_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_HISTORY_GLSL
 
-// In the word of the normal: the photon has been scattered diffusely.
+// State of a photon's path, beside its number of bounces: whether it has been scattered diffusely, or in a medium.
+const uint PHOTON_UNDIFFUSED = 0u;
+const uint PHOTON_DIFFUSED = 1u;
+
+// Where the path set is an expression the state is the photon's class instead (techniques/photon_mapping/path_classes), and stands for the number of scatterings in its record, too.
+const uint PHOTON_CLASSES = 15u;
+
+// Flags of places in scenes with media, beside those of walk/wave.glsl: what waits there comes from a medium, or from a surface. Where ways are stored a place may have
+// both.
+const uint FLAG_VOLUME = 16u;
+const uint FLAG_LANDED = 32u;
+
+// In the word of the normal: the photon has been scattered diffusely, or in a medium.
 const uint PHOTON_DIFFUSED_BIT = 0x40000000u;
 // In the word of the direction: how often it has been scattered before it landed, at most PHOTON_BOUNCE_MAX.
 const uint PHOTON_BOUNCE_SHIFT = 26u;

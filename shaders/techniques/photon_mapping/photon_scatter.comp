@@ -6,6 +6,8 @@
 // leaves its largest band as it is. Scattering functions are those of power (BSDF_IMPORTANCE), and where normals are interpolated the ratio
 // of cosines makes up for it (Veach 1997, 5.3.2), except for what adapt_shading_normal bends.
 //
+// In scenes with media photon_medium.comp has gone before: it has handled those that did not come as far, and says what is left of the others.
+//
 // PM-PH-1, PM-PD-2 to PM-PD-7: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §3.4.1 and §5.1. Deterministic in (seed, pass, photon).
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -31,23 +33,12 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 #include "walk/draws.glsl"
+#include "techniques/photon_mapping/photon_flux.glsl"
+#include "walk/hand_on.glsl"
 #include "walk/survival.glsl"
 
 // Least axis of a kernel, in errors of its position: far from the origin positions lie on a grid, which a kernel must not fall through.
 const float KERNEL_RESOLUTION = 4.0;
-// Steps of a band in a record, over the power of two below the largest band (packing.glsl).
-const float FLUX_STEP_SHARE = 1.0 / 256.0;
-// Below this power of two steps are the same.
-const float FLUX_STEP_LEAST_POWER = 1.0 / 65536.0;
-
-// The flux with noise of a step of its record's bands, so that rounding errs by nothing on average: photons of one history share their flux.
-vec3 dithered_flux(vec3 flux, uint slot, uint bounce) {
-    uvec3 bits = pcg4d(uvec4(push.key.first_index + slot, bounce, push.key.first_sequence, push.key.seed)).xyz;
-    float below = max(uintBitsToFloat(floatBitsToUint(largest_component(flux)) & EXPONENT_BITS), FLUX_STEP_LEAST_POWER);
-    vec3 noise = vec3(unit_float(bits.x), unit_float(bits.y), unit_float(bits.z)) - 0.5;
-    return max(flux + noise * (FLUX_STEP_SHARE * below), vec3(0.0));
-}
-
 void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 normal, Differentials footprint, inout uint flags) {
     atomicAdd(photon_counters.deposits, 1u);
     PhotonKernel kernel;
@@ -61,7 +52,7 @@ void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 n
     } else {
         // Of fixed size, or a footprint beyond all bounds.
         kernel = disk_kernel(settings.length_max * settings.unit_length, normal);
-        fit = !HAS_DIFFERENTIALS || settings.widens_flat != 0u;
+        fit = !HAS_DIFFERENTIALS || settings.shape == KERNEL_FIXED || settings.widens_flat != 0u;
     }
     if (!fit) {
         atomicAdd(photon_counters.without_kernel, 1u);
@@ -72,9 +63,10 @@ void deposit(uint slot, uint place, WalkState photon, SurfacePoint point, vec3 n
     uvec4 q2;
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, path_set_bounce(photon.bounce));
     pack_photon(PhotonRecord(point.position, normal, photon.direction, flux, kernel), q0, q1, q2);
-    add_history(path_set_bounce(photon.bounce), path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
+    uint history = HAS_CLASSES ? path_set_state(photon.bounce) : path_set_bounce(photon.bounce);
+    add_history(history, !HAS_CLASSES && path_set_state(photon.bounce) == PHOTON_DIFFUSED, q0, q1);
     store_waiting(place, q0, q1, q2);
-    flags |= FLAG_WAITING;
+    flags |= HAS_MEDIA ? FLAG_WAITING | FLAG_LANDED : FLAG_WAITING;
 }
 
 // What a virtual light is made of (techniques/instant_radiosity/virtual_light.glsl): power that arrives, unrounded, since it is not averaged over
@@ -141,7 +133,7 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     if (photon.throughput == vec3(0.0) || arrival_is_unlit(a)) {
         return false;
     }
-    if (HAS_ABSORPTION) {
+    if (HAS_ABSORPTION && !HAS_MEDIA) {
         photon.throughput = absorbed(photon.throughput, arrival_interior(a, walk_gathered[slot].interior), hit.t);
     }
     Bsdf bsdf = a.bsdf;
@@ -171,12 +163,18 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     ScatteringFrame frame = scattering_frame(a, normal);
     vec2 side = bounce_sample(slot, bounce, DIMENSION_SIDE);
     BsdfSample scattered = bsdf_sample(bsdf, frame.wo, vec3(bounce_sample(slot, bounce, DIMENSION_DIRECTION), side.x), LOBE_ALL);
-    if (TELLS_CAUSTICS && (HAS_METAL || HAS_SPECULAR_LAYER)) {
+    if ((TELLS_CAUSTICS || HAS_CLASSES) && (HAS_METAL || HAS_SPECULAR_LAYER)) {
         scattered = bsdf_label(bsdf, frame.wo, scattered, LOBE_ALL, false, side.y);
     }
     vec3 wi = frame_to_world(frame, scattered.wi);
     if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi)) {
         return false;
+    }
+    if (HAS_CLASSES) {
+        diffused = path_set_successor(photon_class_successors[diffused], scattered.flags);
+        if (diffused == PATH_SET_DEAD) {
+            return false;
+        }
     }
     vec3 flux = photon.throughput * scattered.weight;
     if (HAS_SHADING_NORMALS || HAS_NORMAL_MAPS) {
@@ -201,16 +199,16 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
         photon_differentials[slot] = footprint;
     }
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (bsdf.flags & BSDF_THIN) == 0u) {
-        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : OUTSIDE;
+        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : HAS_MEDIA ? s.around : OUTSIDE;
     }
-    if ((scattered.flags & LOBE_DIFFUSE) != 0u) {
+    if (!HAS_CLASSES && (scattered.flags & LOBE_DIFFUSE) != 0u) {
         diffused = PHOTON_DIFFUSED;
     }
     photon.throughput = flux / survival;
     photon.origin = departure(a, wi, photon.throughput);
     photon.direction = normalize(wi);
     photon.bounce = path_set_joined(bounce + 1u, diffused);
-    walk_states_out[slot] = photon;
+    store_walk(slot, photon, HAS_MEDIA ? -way_left_out(s, photon.origin, photon.direction) : 0.0);
     return true;
 }
 
@@ -221,7 +219,17 @@ void main() {
     }
     uint slot = load_slot(place);
     uint flags = 0u;
-    if (scatter(slot, place, load_walk(slot), flags)) {
+    WalkState photon = load_walk(slot);
+    if (HAS_MEDIA) {
+        MediumEvent event = walk_medium_events[place];
+        if ((event.flags & EVENT_HANDLED) != 0u) {
+            return;
+        }
+        photon.throughput *= event.weight;
+        // A way that is stored.
+        flags = event.flags & (FLAG_WAITING | FLAG_VOLUME);
+    }
+    if (scatter(slot, place, photon, flags)) {
         flags |= FLAG_ALIVE;
     } else if (load_hit(place).triangle == NO_HIT) {
         atomicAdd(photon_counters.escaped, 1u);

@@ -11,10 +11,6 @@
 
 // descriptor set 3: PhotonWave
 
-// State of a photon's path, beside its number of bounces: whether it has been scattered diffusely.
-const uint PHOTON_UNDIFFUSED = 0u;
-const uint PHOTON_DIFFUSED = 1u;
-
 // What has become of photons.
 layout(set = 3, binding = 0, scalar) restrict buffer PhotonCounters {
     uint escaped;         // left the scene
@@ -24,5 +20,7 @@ layout(set = 3, binding = 0, scalar) restrict buffer PhotonCounters {
 } photon_counters;
 layout(set = 3, binding = 1, scalar) restrict buffer PhotonDifferentials { Differentials photon_differentials[]; };  // by slot
 layout(set = 3, binding = 2, scalar) restrict writeonly buffer PhotonRecords { uvec4 photon_records[]; };
+// Successors of each class of photons by lobe, as of states of path sets; where there are no classes some other buffer is bound, and nothing is read.
+layout(set = 3, binding = 3, scalar) restrict readonly buffer PhotonClassSuccessors { uint photon_class_successors[]; };
 
 #endif

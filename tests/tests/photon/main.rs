@@ -20,6 +20,7 @@ mod scale;
 mod settings;
 mod sphere;
 mod traps;
+mod volume;
 
 use std::f64::consts::PI;
 

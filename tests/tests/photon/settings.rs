@@ -322,28 +322,36 @@ fn what_cannot_be_is_refused_by_name() {
                 other => panic!("{wanted}: {other}"),
             }
         }
-        // More than a range of bounces.
-        for set in ["LS+DE", "LD.*E", "bounces=0..3,L[^S]*E"] {
-            let error = refuse(settings(set));
+        // A range of bounces beside an expression, and an expression behind a final gather.
+        let gathered = PhotonSettings {
+            final_gather: true,
+            ..settings("LS+DE")
+        };
+        for (settings, words) in [
+            (settings("bounces=0..300,L[^S]*E"), "is both"),
+            (gathered, "final gather"),
+        ] {
+            let set = settings.path_set;
+            let error = refuse(settings);
             assert!(matches!(&error, Error::Unsupported { .. }), "{set}: {error}");
             let text = error.to_string();
             assert!(
-                text.contains("range of bounces") && text.contains("is more than that"),
+                text.contains("range of bounces") && text.contains(words),
                 "{set}: {text}"
             );
         }
-        // Media, by the scene.
-        let fog = builtin("builtin:fog-box");
+        // Media that shine, by the scene.
+        let smoke = builtin("builtin:smoke?emission=1");
         let view = View {
-            camera: &fog.cameras[0],
+            camera: &smoke.cameras[0],
             size: SIZE,
             seed: 0,
             aovs: false,
         };
         let prepared =
-            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &fog), &view, &Settings::default()));
+            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &smoke), &view, &Settings::default()));
         match prepared {
-            Ok(_) => panic!("fog was accepted"),
+            Ok(_) => panic!("smoke that shines was accepted"),
             Err(error) => assert!(error.to_string().contains("media"), "{error}"),
         }
     });

@@ -1,9 +1,18 @@
 //! Photon differentials, kernels of photons and their records.
 
-use clerestory::gpu::shaders::constants::{PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS};
+use clerestory::gpu::shaders::constants::{
+    EVENT_LEAF_END, PHOTON_BOUNCE_SHIFT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
+};
 use clerestory::techniques::photon_mapping::kernel::{
     KernelProfile, KernelSettings, KernelShape, PhotonKernel, PhotonRecord, kernel_area, kernel_extent, kernel_profile,
     kernel_weight, pack_photon, photon_ends_leaf, photon_kernel, photon_weight, unpack_photon,
+};
+use clerestory::techniques::photon_mapping::volume::event::{
+    PhotonBeam, PhotonEvent, ball_profile, event_ends_leaf, line_profile, meet_beam, pack_beam, pack_event,
+    unpack_beam, unpack_event,
+};
+use clerestory::techniques::photon_mapping::volume::footprint::{
+    EventKernelSettings, event_radius, footprint_across, log_of_one_plus, passed_differentials, scattered_in_medium,
 };
 use clerestory::transport::differentials::{
     Differentials, area_light_differentials, camera_differentials, diffuse_reemission, emission_differentials,
@@ -443,5 +452,191 @@ fn records_agree_with_their_twins() {
                 vec![if facing { weight } else { 0.0 }]
             },
         );
+    });
+}
+
+#[test]
+fn records_of_events_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(38, |r| {
+            let color = r.magnitude(-12, 8) * Vec3::new(r.unit(), r.unit(), r.unit());
+            // Clear of the rim, where the uniform profile jumps.
+            let d2 = r.choose(&[0.0, 0.2, 0.7, 0.98, 1.0, 1.5]);
+            let rest = [
+                r.magnitude(-10, 4),
+                code(r.below(1 << 20)),
+                code(r.below(80)),
+                r.choose(&[0.0, f32::from_bits(EVENT_LEAF_END)]),
+                code(r.below(3)),
+                d2,
+            ];
+            list32(&[10.0 * r.vector(), direction(r), color], &rest)
+        });
+        let results = twin_photons(gpu, 6, &table, &[]);
+        for (case, result) in table.iter().zip(&results) {
+            let at = |i: usize| Vec3::from_slice(&case.0[i..]);
+            let x = case.0.map(f64::from);
+            let event = PhotonEvent {
+                position: at(0),
+                direction: at(3),
+                flux: at(6),
+                radius: case.0[9],
+                medium: case.0[10].to_bits(),
+                bounce: case.0[11].to_bits(),
+            };
+            let mut words = pack_event(&event);
+            // Divisions may round otherwise than the twin's: a step of one coordinate.
+            for k in 0..2 {
+                let coordinate =
+                    |word: u32| i64::from((word >> (k * PHOTON_DIRECTION_BITS)) & ((1 << PHOTON_DIRECTION_BITS) - 1));
+                let step = (coordinate(result.bits(0)) - coordinate(words[1][2])).abs();
+                assert!(step <= 1, "{:?}", case.0);
+            }
+            assert_eq!(
+                result.bits(0) >> PHOTON_BOUNCE_SHIFT,
+                words[1][2] >> PHOTON_BOUNCE_SHIFT
+            );
+            assert_eq!(result.bits(1), words[1][0], "{:?}", case.0);
+            words[1][2] = result.bits(0);
+            words[0][3] |= case.0[12].to_bits();
+            let back = unpack_event(&words);
+            for (i, value) in [(2, back.direction), (5, back.flux)] {
+                let off = (result.vector(i) - value.as_dvec3()).abs().max_element();
+                assert!(off <= 8.0 * U * f64::from(value.abs().max_element()), "{:?}", case.0);
+            }
+            assert_eq!((result.bits(8), result.bits(9)), (event.radius.to_bits(), event.medium));
+            assert_eq!(
+                (result.bits(10), result.bits(11) == 1),
+                (back.bounce, event_ends_leaf(&words))
+            );
+            let ball = ball_profile(PROFILES[case.0[13].to_bits() as usize], x[14]);
+            assert!((f64::from(result.0[12]) - ball).abs() <= 8.0 * U, "{:?}", case.0);
+        }
+    });
+}
+
+#[test]
+fn footprints_in_media_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(39, |r| {
+            let w = direction(r);
+            // Steps across the way, clear of flat footprints, whose product cancels.
+            let [z1, z2, w1, w2] = loop {
+                let across = [0; 2].map(|_| r.vector().cross(w));
+                if across[0].cross(across[1]).length() > 0.2 * across[0].length() * across[1].length() {
+                    let further = r.range(0.1, 2.0);
+                    break [across[0], across[1], further * across[0], further * across[1]];
+                }
+            };
+            let size = r.choose(&[1e-3, 1.0, 1e3]);
+            let rest = [
+                r.magnitude(-8, 2),
+                r.choose(&[0.0, 1.5, 10.0]),
+                size,
+                size * 1e-4,
+                size * r.choose(&[0.3, 1e6]),
+                size * r.range(0.1, 3.0),
+            ];
+            let densities = [
+                r.magnitude(-8, 4) / size,
+                r.magnitude(-4, 4) / size,
+                r.range(1e-5, 1.0),
+                r.range(0.01, 2.0),
+                r.magnitude(-16, 4),
+            ];
+            let mut all = list32(&[size * z1, size * z2, w1, w2], &rest);
+            all.extend(w.to_array());
+            all.extend(densities);
+            all
+        });
+        let results = twin_photons(gpu, 7, &table, &[]);
+        // Powers of a third and logarithms.
+        judge(
+            "footprints in media",
+            &table,
+            &results,
+            ulps(64.0, 16.0, 0.0),
+            26,
+            |x| {
+                let d = differentials(x, 0);
+                let settings = EventKernelSettings {
+                    spread: x[12],
+                    dampening: x[13],
+                    unit_length: x[14],
+                    length_min: x[15],
+                    length_max: x[16],
+                };
+                let across = footprint_across(&d, x[17], v3(x, 18));
+                let scattered = scattered_in_medium(across, x[21], x[22], x[23], v3(x, 18), x[24]);
+                list![
+                    [
+                        event_radius(&settings, across, x[21], x[22]),
+                        scattered.z1.length(),
+                        scattered.w2.length()
+                    ],
+                    passed_differentials(&d, x[23]).z2.to_array(),
+                    [across, log_of_one_plus(x[25])]
+                ]
+            },
+        );
+    });
+}
+
+#[test]
+fn beams_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(40, |r| {
+            let color = r.magnitude(-12, 8) * Vec3::new(r.unit(), r.unit(), r.unit());
+            // Clear of parallel ones, where the product cancels.
+            let [ray, way] = loop {
+                let [ray, way] = [direction(r), direction(r)];
+                if ray.cross(way).length() > 0.1 {
+                    break [ray, way];
+                }
+            };
+            let start = 4.0 * r.vector();
+            let rest = [code(r.below(1 << 20)), code(r.below(80))];
+            let mut all = list32(&[start, start + way, color], &rest);
+            all.extend(list32(
+                &[4.0 * r.vector(), ray, way],
+                &[code(r.below(3)), r.choose(&[0.0, 0.3, 0.98, 1.0])],
+            ));
+            all
+        });
+        let results = twin_photons(gpu, 8, &table, &[]);
+        for (case, result) in table.iter().zip(&results) {
+            let at = |i: usize| Vec3::from_slice(&case.0[i..]);
+            let x = case.0.map(f64::from);
+            let beam = PhotonBeam {
+                start: at(0),
+                end: at(3),
+                flux: at(6),
+                medium: case.0[9].to_bits(),
+                bounce: case.0[10].to_bits(),
+            };
+            let words = pack_beam(&beam);
+            assert_eq!([result.bits(0), result.bits(1)], [words[0][3], words[1][3]]);
+            let back = unpack_beam(&words);
+            assert_eq!([result.bits(2), result.bits(3)], [back.medium, back.bounce]);
+            let meeting = meet_beam(v3(&x, 11), v3(&x, 14), v3(&x, 0), v3(&x, 17));
+            // Products of lengths up to some metres over the sine's square, of at least a hundredth.
+            let near = |i: usize, value: f64| (f64::from(result.0[i]) - value).abs() <= 4e4 * U;
+            assert!(
+                near(4, meeting.t) && near(5, meeting.along) && near(6, meeting.squared),
+                "{:?}",
+                case.0
+            );
+            assert!(
+                (f64::from(result.0[7]) - meeting.sine).abs() <= 16.0 * U,
+                "{:?}",
+                case.0
+            );
+            let profile = PROFILES[case.0[20].to_bits() as usize];
+            assert!(
+                (f64::from(result.0[8]) - line_profile(profile, x[21])).abs() <= 8.0 * U,
+                "{:?}",
+                case.0
+            );
+        }
     });
 }

@@ -70,6 +70,8 @@ sources! {
     IEC_61966_2_1 = "iec-61966-2-1": "IEC", "61966-2-1: Default RGB Colour Space, sRGB", "", 1999;
     IGEHY_1999 = "igehy-1999": "H. Igehy", "Tracing Ray Differentials", "SIGGRAPH", 1999;
     IZE_2013 = "ize-2013": "T. Ize", "Robust BVH Ray Traversal", "JCGT 2(2)", 2013;
+    JAROSZ_2008 = "jarosz-2008": "W. Jarosz, M. Zwicker, H. W. Jensen", "The Beam Radiance Estimate for Volumetric Photon Mapping", "Computer Graphics Forum 27(2)", 2008;
+    JAROSZ_2011 = "jarosz-2011": "W. Jarosz, D. Nowrouzezahrai, I. Sadeghi, H. W. Jensen", "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon Points and Beams", "ACM TOG 30(1)", 2011;
     JARZYNSKI_OLANO_2020 = "jarzynski-olano-2020": "M. Jarzynski, M. Olano", "Hash Functions for GPU Rendering", "JCGT 9(3)", 2020;
     JENSEN_1996 = "jensen-1996": "H. W. Jensen", "Global Illumination using Photon Maps", "EGWR", 1996;
     JENSEN_2001 = "jensen-2001": "H. W. Jensen", "Realistic Image Synthesis Using Photon Mapping", "A K Peters", 2001;

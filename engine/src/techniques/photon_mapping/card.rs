@@ -2,15 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer};
+use super::{PhotonMapper, PhotonSettings, gather, kernel, queue, tracer, volume};
 use crate::Result;
 use crate::accel::photon_map::device::MapBuilder;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::path_shade;
 use crate::gpu::shaders::techniques::photon_mapping::{
-    photon_append, photon_boxes, photon_emit, photon_gather, photon_gather_packet, photon_leaf_size, photon_leaves,
-    photon_scatter,
+    photon_append, photon_beam, photon_boxes, photon_emit, photon_event_boxes, photon_event_leaves, photon_gather,
+    photon_gather_packet, photon_leaf_size, photon_leaves, photon_medium, photon_scatter, photon_volume_append,
+    photon_volume_flags,
 };
 use crate::kernels::{RadixSort, Scan};
 use crate::scene::SceneProfile;
@@ -22,8 +23,15 @@ use crate::transport::{PathSet, SURFACE_FEATURES};
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "photon",
-    summary: "progressive photon mapping: indirect light on diffuse surfaces from a map of photons, rebuilt for each pass, with kernels that shrink",
-    rows: &[ROWS, gather::ROWS, kernel::ROWS, queue::ROWS, tracer::ROWS],
+    summary: "progressive photon mapping: indirect light on diffuse surfaces and in media from maps of photons, rebuilt for each pass, with kernels that shrink",
+    rows: &[
+        ROWS,
+        gather::ROWS,
+        kernel::ROWS,
+        queue::ROWS,
+        tracer::ROWS,
+        volume::ROWS,
+    ],
     bias: BIAS,
     needs: &[],
     kernels: &[
@@ -77,23 +85,39 @@ fn law(settings: &Settings) -> Result<Law> {
 
 /// Why a scene cannot be modelled.
 pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
-    if profile.media.any() {
-        vec!["the scene has participating media, and photon maps hold surfaces only".into()]
-    } else {
-        Vec::new()
+    let mut reasons = Vec::new();
+    if profile.media.emits {
+        reasons.push("the scene has participating media that emit light, which no photon carries".into());
     }
+    let from_infinity = profile.has_environment() || profile.lights.directional > 0;
+    if profile.media.surrounding && from_infinity {
+        let reason =
+            "the scene has endless participating media and light from infinity, which no photon brings through them";
+        reasons.push(reason.into());
+    }
+    reasons
 }
 
 /// What a picture may take with default settings, of whatever scene, beside what eye paths do.
-const KERNELS: [&ShaderInfo; 4] = [
+const KERNELS: [&ShaderInfo; 8] = [
     &photon_emit::INFO,
+    &photon_medium::INFO,
     &photon_scatter::INFO,
     &photon_append::INFO,
+    &photon_volume_flags::INFO,
+    &photon_volume_append::INFO,
+    &photon_beam::INFO,
     &photon_gather::INFO,
 ];
 
 /// The same where the device builds the map, beside those of its tree.
-const DEVICE_MAP_KERNELS: [&ShaderInfo; 3] = [&photon_boxes::INFO, &photon_leaf_size::INFO, &photon_leaves::INFO];
+const DEVICE_MAP_KERNELS: [&ShaderInfo; 5] = [
+    &photon_boxes::INFO,
+    &photon_leaf_size::INFO,
+    &photon_leaves::INFO,
+    &photon_event_boxes::INFO,
+    &photon_event_leaves::INFO,
+];
 
 /// What the specialization constants of photons' scattering and of queries stand for, beside those of eye paths.
 const PHOTON_FEATURES: [Omission; 2] = [
@@ -126,7 +150,7 @@ impl Technique for PhotonMapper {
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         let (eye, c) = (self.eye_counters(), self.counts());
-        BTreeMap::from([
+        let mut all = BTreeMap::from([
             ("paths", eye.paths),
             ("extend_rays", eye.extend_rays),
             ("shadow_rays", eye.shadow_rays),
@@ -143,7 +167,16 @@ impl Technique for PhotonMapper {
             ("photons_without_kernel", c.photons.without_kernel),
             ("map_queries", c.gather.queries),
             ("photons_gathered", c.gather.photons),
-        ])
+        ]);
+        if self.profile().media.any() {
+            all.extend([
+                ("medium_collisions", eye.medium_collisions + c.photons.collisions),
+                ("events_stored", c.events),
+                ("beam_queries", c.beams.queries),
+                ("events_gathered", c.beams.photons),
+            ]);
+        }
+        all
     }
 
     fn skipped(&self) -> Vec<Skipped> {
@@ -176,7 +209,7 @@ const ROWS: &[Row] = &[Row {
     id: "PM-SYS-1",
     name: "technique `photon`: direct light and specular chains by rays, all else from a photon map, rebuilt for each pass (stochastic progressive photon mapping)",
     role: Role::Technique,
-    limits: "Refuses scenes with media; light of unlit surfaces beyond the first diffuse reflection is missing, and glossy lobes never use the map.",
+    limits: "Refuses media that emit and endless media with light from infinity; light of unlit surfaces beyond the first diffuse reflection is missing, and glossy lobes never use the map.",
     sources: &[
         sources::JENSEN_2001.whole(),
         sources::HACHISUKA_JENSEN_2009.whole(),
@@ -191,6 +224,8 @@ const ROWS: &[Row] = &[Row {
     path_set: Some("all"),
     bias: Some(BIAS),
     tests: &[
+        "engine/src/techniques/photon_mapping/path_classes.rs::eye_paths_and_maps_have_every_path_once",
+        "tests/tests/photon/volume.rs::expressions_agree_with_the_path_tracer",
         "tests/tests/photon/convergence.rs::radii_fall_at_the_rate_of_the_theory",
         "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
         "tests/tests/photon/settings.rs::parts_of_the_light_sum_to_the_whole",

@@ -3,8 +3,10 @@
 use std::sync::OnceLock;
 
 use super::map::PhotonMap;
+use super::path_classes::{ASKING_STATES, PathClasses};
 use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
+use super::volume::{Beam, BeamAsk, BeamStage, EventMap};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
@@ -71,6 +73,10 @@ pub(super) struct Gather {
     gather_states: u32,
     caustic_states: u32,
     bounces: [u32; 2],
+    /// [`PathClasses::asks`].
+    classes: [u32; ASKING_STATES],
+    /// Only in scenes with media.
+    beam: Option<Beam>,
 }
 
 /// Queries of one map, to be recorded with a wave.
@@ -82,13 +88,22 @@ pub(super) struct GatherStage<'a> {
     scale: f32,
     neighbors: u32,
     radius: f32,
+    /// Of the volume map, in scenes with media.
+    beam: Option<BeamStage<'a>>,
 }
 
 type Counters = photon_gather::GatherCounters;
 
 impl Gather {
-    /// For eye paths of the set `eye`, up to `slots` at once.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &PhotonSettings, eye: &PathSet, slots: u32) -> Result<Self> {
+    /// For eye paths of the set `eye`, up to `slots` at once, which ask for photons of some classes where the path set is an expression.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        settings: &PhotonSettings,
+        eye: &PathSet,
+        classes: Option<&PathClasses>,
+        slots: u32,
+    ) -> Result<Self> {
         let set = &settings.path_set;
         // Photons have been scattered once before they land, and at the point that gathers them.
         let least = if settings.direct_photons { 1 } else { 2 };
@@ -98,6 +113,7 @@ impl Gather {
         };
         let queue = Queue::new(gpu, scene, settings.queue, ask, slots)?;
         let nearest = settings.neighbors > 0;
+        let has_media = scene.profile().media.any();
         // Both entry points have the same constants.
         macro_rules! spec {
             ($shader:ident, $queue:expr, $linear:expr) => {
@@ -112,6 +128,8 @@ impl Gather {
                     nearest,
                     linear: $linear,
                     queue: $queue,
+                    has_media,
+                    has_classes: classes.is_some(),
                     ..Default::default()
                 })
             };
@@ -135,7 +153,19 @@ impl Gather {
         } else {
             Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
         };
-        let (gather_states, caustic_states) = gathering_states(settings, eye);
+        let (gather_states, caustic_states) = match classes {
+            Some(classes) => (classes.asking()[0], 0),
+            None => gathering_states(settings, eye),
+        };
+        let asking = BeamAsk {
+            eye,
+            classes,
+            surface_states: gather_states,
+            counts_bounces: ask.counts_bounces,
+        };
+        let beam = has_media
+            .then(|| Beam::new(gpu, scene, settings, asking, slots))
+            .transpose()?;
         let bytes = size_of::<Counters>() as u64;
         let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
         let counters_readback = gpu.buffer(&BufferDesc::readback("gather counters", bytes))?;
@@ -149,6 +179,8 @@ impl Gather {
             gather_states,
             caustic_states,
             bounces: [set.min_bounces(), set.max_bounces().unwrap_or(u32::MAX)],
+            classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
+            beam,
             gpu: gpu.clone(),
         })
     }
@@ -159,18 +191,28 @@ impl Gather {
             Query::Single(kernel) => kernel.info(),
             Query::Packet(kernel) => kernel.info(),
         });
+        all.extend(self.beam.iter().flat_map(Beam::pipelines));
         all
     }
 
-    /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for.
+    /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
+    /// of the map of events there, whose beams have a radius, m.
     pub fn stage<'a>(
         &'a self,
         scene: &'a GpuScene,
         map: &'a PhotonMap,
+        events: Option<(&'a EventMap, f64)>,
         scale: f64,
         (neighbors, radius): (u32, f64),
     ) -> GatherStage<'a> {
+        let beam = self.beam.as_ref().zip(events).map(|(beam, (map, radius))| BeamStage {
+            beam,
+            map,
+            scale: scale as f32,
+            radius: radius as f32,
+        });
         GatherStage {
+            beam,
             gather: self,
             scene,
             map,
@@ -187,6 +229,11 @@ impl Gather {
             queries: u64::from(counters.queries),
             photons: wide_counter(counters.photons),
         })
+    }
+
+    /// The same of the volume map.
+    pub fn volume_counts(&self) -> Result<GatherCounts> {
+        self.beam.as_ref().map_or(Ok(GatherCounts::default()), Beam::counts)
     }
 }
 
@@ -210,6 +257,7 @@ impl GatherStage<'_> {
             scale: self.scale,
             neighbors: self.neighbors,
             radius: self.radius,
+            classes: self.gather.classes,
             ..Default::default()
         }
     }
@@ -220,6 +268,11 @@ impl GatherStage<'_> {
             photon_map_records: &self.map.records,
             gather_counters: self.gather.counters.view(),
             photon_map_root: self.map.root.view(),
+            photon_beam_ways: self
+                .gather
+                .beam
+                .as_ref()
+                .map_or(self.gather.counters.view(), Beam::ways),
         }
     }
 }
@@ -228,6 +281,9 @@ impl ArrivalStage for GatherStage<'_> {
     fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
         let gather = self.gather;
         let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
+        if let Some(beam) = &self.beam {
+            recorder.pass("photon: beams", |pass| beam.record(pass, self.scene, wave, places))?;
+        }
         let mut groups = places.items;
         if !matches!(gather.queue, Queue::Slots) {
             recorder.pass("photon: gather queue", |pass| {
@@ -249,14 +305,17 @@ impl ArrivalStage for GatherStage<'_> {
     }
 
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.beam.as_ref().map_or(Ok(()), |beam| beam.reset(pass))?;
         pass.update(self.gather.counters.view(), &[Counters::default()])
     }
 
     fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.beam.as_ref().map_or(Ok(()), |beam| beam.read_back(pass))?;
         pass.copy(self.gather.counters.view(), self.gather.counters_readback.view())
     }
 
     fn prepare_stopped(&self) -> Result<()> {
+        self.beam.as_ref().map_or(Ok(()), BeamStage::prepare_stopped)?;
         if let Linear::Records(spec, made) = &self.gather.linear
             && made.get().is_none()
         {
@@ -274,6 +333,25 @@ impl ArrivalStage for GatherStage<'_> {
         part: u64,
     ) -> Result<Option<u64>> {
         let gather = self.gather;
+        // Those of beams come first.
+        let beams = self
+            .beam
+            .as_ref()
+            .map(|beam| (beam, LinearParts::new(gather.quota, beam.map.count, stopped)));
+        let of_beams = beams.as_ref().map_or(0, |(_, parts)| parts.count());
+        if let Some((beam, parts)) = beams.filter(|_| part < of_beams) {
+            let (mut part, mut taken) = (part, 0);
+            recorder.pass("photon: beams all", |pass| {
+                while part < of_beams && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {
+                    let places = [parts.first_place(part), parts.places];
+                    beam.record_linear(pass, self.scene, wave, stopped.key, places, parts.records(part))?;
+                    taken += parts.cost();
+                    part += 1;
+                }
+                Ok(())
+            })?;
+            return Ok(Some(part));
+        }
         let Linear::Records(_, made) = &gather.linear else {
             return Err(Error::Overflow {
                 kernel: "photon_gather".into(),
@@ -290,7 +368,7 @@ impl ArrivalStage for GatherStage<'_> {
         })?;
         let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
         let parts = LinearParts::new(gather.quota, self.map.count, stopped);
-        let (mut part, mut taken) = (part, 0);
+        let (mut part, mut taken) = (part - of_beams, 0);
         recorder.pass("photon: gather all", |pass| {
             while part < parts.count() && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {
                 let [first, last] = parts.records(part);
@@ -308,7 +386,7 @@ impl ArrivalStage for GatherStage<'_> {
             }
             Ok(())
         })?;
-        Ok((part < parts.count()).then_some(part))
+        Ok((part < parts.count()).then_some(of_beams + part))
     }
 }
 
@@ -499,6 +577,7 @@ pub(crate) const ROWS: &[Row] = &[
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::walk::WalkKey;
 
     #[test]
     fn linear_parts_take_every_record_at_every_place_once_in_order() {
@@ -510,7 +589,8 @@ mod tests {
             (32_768, 32_768, 8192, 8192),
             (3, 10, 65, 65),
         ] {
-            let parts = LinearParts::new(quota, count, StoppedPlaces { places, stopped });
+            let key = WalkKey::default();
+            let parts = LinearParts::new(quota, count, StoppedPlaces { places, stopped, key });
             // Records that the places of each range have gone through.
             let mut done = std::collections::BTreeMap::new();
             for part in 0..parts.count() {

@@ -6,8 +6,8 @@
 //! Trinity College Dublin, 2011, §6.3.
 //!
 //! Light paths are parted without overlap: what the eye sees through specular and glossy scattering alone, and the light that arrives
-//! directly where it first sees a diffuse surface, are the path tracer's; everything else that arrives there is the map's. Glossy lobes are
-//! never estimated from the map. Three kinds of light are the eye paths' alone, so that what they give beyond the first diffuse reflection
+//! directly where it first sees a diffuse surface or a medium scatters it, are the path tracer's; everything else that arrives there is the maps', one of
+//! surfaces and one of media. Glossy lobes are never estimated from the map. Three kinds of light are the eye paths' alone, so that what they give beyond the first diffuse reflection
 //! is missing: unlit surfaces, emitters behind others with alpha in the same place, and slivers that light sampling leaves out. A photon
 //! that starts inside a solid knows it from where it first meets the inside of one.
 //!
@@ -23,6 +23,9 @@ use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, u
 use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
 use super::settings::{MapBuild, PhotonSettings};
 use super::tracer::{PhotonAppend, PhotonCounts, PhotonTracer, Tracing, flux_scale};
+use super::volume::event::{EventWords, PhotonEvent, unpack_event};
+use super::volume::footprint::EventKernelSettings;
+use super::volume::{EventMap, EventMaps};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
@@ -48,8 +51,12 @@ pub struct MapperCounts {
     pub cover: f64,
     /// Records that leaves of the last map were to hold at most.
     pub leaf_size: u32,
+    /// Events of all maps of media.
+    pub events: u64,
     /// Queries.
     pub gather: GatherCounts,
+    /// Ways through media that asked the maps of these, and the kernels that they met.
+    pub beams: GatherCounts,
     /// Seconds of wall clock that photons were traced for.
     pub trace_seconds: f64,
     /// Seconds that maps were built for: by the host those of wall clock, with copies; by the device those of wall clock until a build was
@@ -69,10 +76,18 @@ impl MapperCounts {
 pub struct MappedPhoton {
     /// Its record, with its flux in W.
     pub record: PhotonRecord,
-    /// How often it had been scattered, at most [`PHOTON_BOUNCE_MAX`](crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX).
+    /// How often it had been scattered, at most [`PHOTON_BOUNCE_MAX`](crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX); where the path set is an expression, the class
+    /// of its history.
     pub bounce: u32,
     /// Whether it had been scattered diffusely; told by the final gather alone.
     pub diffused: bool,
+}
+
+/// A collision of a photon with a medium, as the map of a pass has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MappedEvent {
+    /// Its record, with the flux that is scattered in W.
+    pub event: PhotonEvent,
 }
 
 /// A progressive rendering of one view by photon mapping.
@@ -90,18 +105,21 @@ struct Photons {
     tracer: PhotonTracer,
     gather: Gather,
     maker: MapMaker,
+    /// Only in scenes with media.
+    event_maps: Option<EventMaps>,
     /// The photons of the pass under way, until all of them have landed.
     tracing: Option<Tracing>,
     /// Of the pass under way.
     map: Option<PhotonMap>,
+    events: Option<EventMap>,
 }
 
 impl PhotonMapper {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with
-    /// participating media and for a path set that is more than a range of bounces, [`Error::MissingFeature`](crate::Error::MissingFeature) for packets of queries on
+    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with media that emit, or with light from infinity in an endless one, and for a path set
+    /// that is neither a range of bounces nor an expression, [`Error::MissingFeature`](crate::Error::MissingFeature) for packets of queries on
     /// a device without votes, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
         gpu: &Gpu,
@@ -118,7 +136,12 @@ impl PhotonMapper {
                 reasons,
             });
         }
-        let eye_paths = settings.eye_paths()?;
+        let has_media = scene.profile().media.any();
+        if has_media && settings.stores_ways() && scene.profile().media.heterogeneous {
+            let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\" or \"march\"";
+            return Err(Error::setting("volume", "beams", cause));
+        }
+        let (classes, eye_paths) = (settings.classes()?, settings.eye_paths(has_media)?);
         let eye_settings = PathTracerSettings {
             path_set: eye_paths,
             sampler: settings.sampler,
@@ -132,7 +155,8 @@ impl PhotonMapper {
         let has_map = settings.needs_photons() && scene.has_lights();
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            PhotonTracer::new(gpu, Arc::clone(&scene), settings.plan(), append)
+            let (plan, ways) = (settings.plan(has_media), settings.stores_ways());
+            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), ways)
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
@@ -140,10 +164,14 @@ impl PhotonMapper {
         let photons = match tracer {
             Some(tracer) => Some(Photons {
                 tracer,
-                gather: Gather::new(gpu, &scene, &settings, &eye_paths, eye.slots())?,
+                gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), eye.slots())?,
                 maker: MapMaker::new(gpu, settings.map_build)?,
+                event_maps: has_media
+                    .then(|| EventMaps::new(gpu, settings.map_build, settings.stores_ways()))
+                    .transpose()?,
                 tracing: None,
                 map: None,
+                events: None,
             }),
             None => None,
         };
@@ -188,6 +216,7 @@ impl PhotonMapper {
         if let Some(photons) = &self.photons {
             all.extend(photons.tracer.pipelines());
             all.extend(photons.maker.pipelines());
+            all.extend(photons.event_maps.iter().flat_map(EventMaps::pipelines));
             all.extend(photons.gather.pipelines());
         }
         all
@@ -221,7 +250,7 @@ impl PhotonMapper {
     /// Before the first pass.
     fn begin(&mut self) {
         if let Some(photons) = &mut self.photons {
-            (photons.tracing, photons.map) = (None, None);
+            (photons.tracing, photons.map, photons.events) = (None, None, None);
         }
     }
 
@@ -238,13 +267,19 @@ impl PhotonMapper {
             return Ok(None);
         };
         let mut timings = Vec::new();
-        let (kernel, watts) = (self.kernel(pass), self.watts());
+        let (kernel, watts, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
             let clock = Instant::now();
             let begun = photons.tracing.take();
-            let mut tracing = begun.unwrap_or_else(|| photons.tracer.begin(pass, Some(&kernel)));
+            let begin = || {
+                photons
+                    .tracer
+                    .begin(pass, Some(&kernel))
+                    .with_event_kernel(event_kernel)
+            };
+            let mut tracing = begun.unwrap_or_else(begin);
             let all = photons.tracer.advance(&mut tracing)?;
             timings.append(&mut tracing.take_timings());
             self.counts.trace_seconds += clock.elapsed().as_secs_f64();
@@ -268,20 +303,41 @@ impl PhotonMapper {
                     (map, photons.maker.figures(area)?)
                 }
             };
+            if let (Some(maps), Some(events)) = (&mut photons.event_maps, photons.tracer.events()) {
+                let clock = Instant::now();
+                let (map, building) = maps.make(events, traced.events, event_kernel.length_max)?;
+                seconds += clock.elapsed().as_secs_f64();
+                if let Some(building) = building {
+                    let built = building.wait()?;
+                    seconds += seconds_of(&built);
+                    timings.push(built);
+                }
+                photons.events = Some(map);
+            }
             figures.into_iter().for_each(|figures| self.counts.note(figures));
             photons.map = Some(map);
             self.counts.map_seconds += seconds;
             self.counts.passes += 1;
             self.counts.photons += traced.counts;
             self.counts.records += u64::from(traced.records);
+            self.counts.events += u64::from(traced.events);
             return Ok(Some(self.eye.step_so_far(timings, samples)));
         }
         let stage = match &self.photons {
             Some(Photons {
-                gather, map: Some(map), ..
+                gather,
+                map: Some(map),
+                events,
+                ..
             }) => {
                 let nearest = (self.settings.neighbors_in(pass), kernel.length_max * kernel.unit_length);
-                Some(gather.stage(&self.scene, map, watts, nearest))
+                Some(gather.stage(
+                    &self.scene,
+                    map,
+                    events.as_ref().map(|map| (map, event_kernel.length_max)),
+                    watts,
+                    nearest,
+                ))
             }
             _ => None,
         };
@@ -293,6 +349,9 @@ impl PhotonMapper {
                 let counts = photons.gather.counts()?;
                 self.counts.gather.queries += counts.queries;
                 self.counts.gather.photons += counts.photons;
+                let beams = photons.gather.volume_counts()?;
+                self.counts.beams.queries += beams.queries;
+                self.counts.beams.photons += beams.photons;
             }
         }
         let Some(mut step) = step else {
@@ -301,7 +360,7 @@ impl PhotonMapper {
         if self.eye.has_ended_pass(done, each)
             && let Some(photons) = &mut self.photons
         {
-            photons.map = None;
+            (photons.map, photons.events) = (None, None);
         }
         timings.append(&mut step.timings);
         Ok(Some(self.eye.step_so_far(timings, samples)))
@@ -336,6 +395,35 @@ impl PhotonMapper {
         Ok(mapped.collect())
     }
 
+    /// Traces the photons of a pass, and returns their collisions with media that are stored, in the order of waves, in each of bounces and photons. The picture is
+    /// not touched, and counts go on. With [`VolumeEstimate::Beams`](super::volume::VolumeEstimate::Beams) there are none.
+    ///
+    /// # Errors
+    /// As [`PhotonMapper::step`].
+    pub fn events(&mut self, pass: u32) -> Result<Vec<MappedEvent>> {
+        let (kernel, scale, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
+        let Some(photons) = &mut self.photons else {
+            return Ok(Vec::new());
+        };
+        photons.tracing = None;
+        let tracing = photons
+            .tracer
+            .begin(pass, Some(&kernel))
+            .with_event_kernel(event_kernel);
+        let traced = photons.tracer.finish(tracing)?;
+        self.counts.photons += traced.counts;
+        let Some(events) = photons.tracer.events().filter(|_| !self.settings.stores_ways()) else {
+            return Ok(Vec::new());
+        };
+        let words: Vec<EventWords> = self.gpu.read(events.buffer().view(), traced.events as usize)?;
+        let mapped = words.iter().map(|words| {
+            let mut event = unpack_event(words);
+            event.flux *= scale as f32;
+            MappedEvent { event }
+        });
+        Ok(mapped.collect())
+    }
+
     /// Traces the photons of a pass and reads their map back as `build` makes it, which is the same whoever does. The picture is not touched,
     /// and counts go on; `None` where there are no photons.
     ///
@@ -357,6 +445,16 @@ impl PhotonMapper {
     /// How the kernels of a pass are made.
     pub fn kernel(&self, pass: u32) -> KernelSettings {
         self.settings.kernel(pass, self.diagonal(), self.scene.surface_area())
+    }
+
+    /// Radius of the kernels of events in media, m, in a pass; the greatest where they follow footprints.
+    pub fn event_radius(&self, pass: u32) -> f64 {
+        self.settings.event_radius(pass, self.diagonal())
+    }
+
+    /// How the kernels of events in media are made in a pass.
+    pub fn event_kernel(&self, pass: u32) -> EventKernelSettings {
+        self.settings.event_kernel(pass, self.diagonal())
     }
 
     /// Of the scene's box, m.

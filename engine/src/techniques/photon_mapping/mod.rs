@@ -7,14 +7,16 @@ mod device_map;
 mod gather;
 mod map;
 mod mapper;
+mod path_classes;
 mod queue;
 mod settings;
 mod tracer;
+pub mod volume;
 
 pub(super) use card::CARD;
 pub use gather::GatherCounts;
 pub use map::{MapContents, map_contents};
-pub use mapper::{MappedPhoton, MapperCounts, PhotonMapper};
+pub use mapper::{MappedEvent, MappedPhoton, MapperCounts, PhotonMapper};
 pub use settings::{MapBuild, MapQuery, MapQueue, PhotonSettings};
 pub use tracer::PhotonCounts;
 pub(super) use tracer::{Append, PhotonPlan, PhotonTracer, Stored, Tracing};

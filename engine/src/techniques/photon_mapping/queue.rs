@@ -83,6 +83,7 @@ impl Queue {
                 let scratch = BufferDesc::storage("gather scratch", partition.scratch_bytes(slots), Category::Work);
                 let head = BufferDesc::storage("gather queue", IndirectCount::BYTES, Category::Work);
                 let flag = surface_spec!(photon_queue_flags, scene, {
+                    has_media: scene.profile().media.any(),
                     has_path_automaton,
                     counts_bounces,
                     ..Default::default()
@@ -105,6 +106,7 @@ impl Queue {
                 let queue_width = gpu.caps().subgroup_size.clamp(1, WALK_GROUP);
                 let append = surface_spec!(photon_queue_blocks, scene, {
                     queue_width,
+                    has_media: scene.profile().media.any(),
                     has_path_automaton,
                     counts_bounces,
                     ..Default::default()

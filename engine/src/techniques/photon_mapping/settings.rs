@@ -1,7 +1,10 @@
 //! Settings of photon mapping, and the path sets of its two parts.
 
 use super::kernel::{KernelProfile, KernelSettings, KernelShape};
+use super::path_classes::PathClasses;
 use super::tracer::{PhotonPlan, Stored};
+use super::volume::footprint::{EventKernelSettings, event_step};
+use super::volume::{VolumeEstimate, VolumeKernel};
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
 use crate::techniques::path::SAMPLES_PER_WAVE;
@@ -67,7 +70,7 @@ crate::settings! {
     /// Settings of photon mapping.
     pub struct PhotonSettings {
         /// Which light paths the picture contains.
-        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63";
+        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63 | an expression, without a range of bounces";
         /// More give less noise, and less bias with kernels that follow footprints.
         pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons per pass";
         /// Kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials.
@@ -105,6 +108,19 @@ crate::settings! {
         pub reduction: f32 = 2.0 / 3.0, in AboveTo(0.0, 1.0);
         /// Eye paths per pixel that query the same map.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
+        /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or whole ways, in
+        /// homogeneous media alone.
+        pub volume: VolumeEstimate = VolumeEstimate::Ray;
+        /// Kernels of photons in media have one radius, or that of each photon's footprint.
+        pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
+        /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by the size of the scene.
+        ///
+        /// 0 stands for a fiftieth of the scene's diagonal for fixed kernels, a ninth for others.
+        pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
+        /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
+        pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
+        /// From which size on kernels in media that follow footprints grow slower, by a logarithm, in unit lengths; 0 leaves them as they are.
+        pub volume_dampening: f32 = 3.0, in 0.0..;
         /// Takes direct light from the map, too, instead of by shadow rays; cannot be combined with final_gather.
         pub direct_photons: bool = false;
         /// Sees the map after one more diffuse reflection, caustics directly; cannot be combined with direct_photons.
@@ -200,14 +216,67 @@ impl PhotonSettings {
         }
     }
 
+    /// Radius of the kernels of events in media, m, in a pass, in a scene of that diagonal: the area of disks, the width of beams or the volume of balls falls from pass to pass as
+    /// [`reduction`](PhotonSettings::reduction) says.
+    ///
+    /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011.
+    pub(super) fn event_radius(&self, pass: u32, diagonal: f64) -> f64 {
+        let share = match self.volume_kernel {
+            VolumeKernel::Fixed => RADIUS_SHARE,
+            VolumeKernel::Footprint => UNIT_SHARE,
+        };
+        let first = match f64::from(self.volume_radius) {
+            0.0 if diagonal > 0.0 => share * diagonal,
+            0.0 => 1.0,
+            set => set,
+        };
+        first * self.event_shrinkage(pass)
+    }
+
+    /// Radius of events' kernels in a pass relative to the first.
+    fn event_shrinkage(&self, pass: u32) -> f64 {
+        let shrunk = shrinkage(pass, f64::from(self.reduction));
+        match self.volume {
+            VolumeEstimate::Beams => shrunk.powi(2),
+            VolumeEstimate::Ray => shrunk,
+            VolumeEstimate::March => shrunk.powf(2.0 / 3.0),
+        }
+    }
+
+    /// Whether the ways of photons through media are stored, instead of their collisions.
+    pub(super) fn stores_ways(&self) -> bool {
+        self.volume == VolumeEstimate::Beams
+    }
+
+    /// Kernels of events in media in a pass, in a scene of that diagonal, m.
+    pub(super) fn event_kernel(&self, pass: u32, diagonal: f64) -> EventKernelSettings {
+        let unit_length = match f64::from(self.unit_length) {
+            0.0 if diagonal > 0.0 => UNIT_SHARE * diagonal,
+            0.0 => 1.0,
+            set => set,
+        };
+        let (length_max, shrunk) = (self.event_radius(pass, diagonal), self.event_shrinkage(pass));
+        EventKernelSettings {
+            spread: f64::from(self.volume_spread) * event_step(f64::from(self.photons)) * shrunk,
+            dampening: f64::from(self.volume_dampening),
+            unit_length,
+            length_min: match self.volume_kernel {
+                VolumeKernel::Fixed => length_max,
+                VolumeKernel::Footprint => (LENGTH_MIN * unit_length * shrunk).min(length_max),
+            },
+            length_max,
+        }
+    }
+
     /// How photons are traced.
-    pub(super) fn plan(&self) -> PhotonPlan {
+    pub(super) fn plan(&self, has_media: bool) -> PhotonPlan {
+        let in_media = has_media && self.volume_kernel == VolumeKernel::Footprint && !self.stores_ways();
         PhotonPlan {
             photons: self.photons,
             sampler: self.sampler,
             seed: self.seed,
             submission_work: self.submission_work,
-            follows_footprints: self.follows_footprints(),
+            follows_footprints: self.follows_footprints() || in_media,
             tells_caustics: self.final_gather,
             even_survival: false,
             stores_lights: false,
@@ -234,30 +303,53 @@ impl PhotonSettings {
             .is_none_or(|max| max > u32::from(!self.direct_photons))
     }
 
-    /// What eye paths gather by themselves: light seen through specular and glossy scattering, and direct light at the first diffuse surface
-    /// (with a final gather, at the second too).
+    /// How an expression's light paths are parted; `None` for a range of bounces.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for a path set that is more than a range of bounces.
-    pub(super) fn eye_paths(&self) -> Result<PathSet> {
-        if self.path_set != PathSet::new(self.path_set.min_bounces(), self.path_set.max_bounces(), PATH_SET_LOBES)? {
-            return Err(Error::Unsupported {
-                technique: "photon".into(),
-                reasons: vec![format!(
-                    "its pictures contain all paths of a range of bounces (bounces=A..B), but {} is more than that",
-                    self.path_set
-                )],
-            });
+    /// [`Error::Unsupported`] for an expression beside a range of bounces, behind a final gather, and one that tells too much apart.
+    pub(super) fn classes(&self) -> Result<Option<PathClasses>> {
+        let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
+        if self.path_set == PathSet::new(min, max, PATH_SET_LOBES)? {
+            return Ok(None);
+        }
+        let refuse = |why: &str| Error::Unsupported {
+            technique: "photon".into(),
+            reasons: vec![format!(
+                "its pictures contain the paths of a range of bounces (bounces=A..B) or of an expression, but {} {why}",
+                self.path_set
+            )],
+        };
+        if (min, max) != (0, None) {
+            return Err(refuse("is both"));
+        }
+        if self.final_gather {
+            return Err(refuse("is none that a final gather can part"));
+        }
+        PathClasses::new(&self.path_set, self.direct_photons)
+            .map(Some)
+            .map_err(refuse)
+    }
+
+    /// What eye paths gather by themselves: light seen through specular and glossy scattering, and direct light at the first diffuse surface
+    /// (with a final gather, at the second too), in scenes with media also at the first scattering in a medium.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] as [`classes`](PhotonSettings::classes), [`Error::Setting`] for more bounces than records can count.
+    pub(super) fn eye_paths(&self, has_media: bool) -> Result<PathSet> {
+        if let Some(classes) = self.classes()? {
+            return Ok(classes.eye);
         }
         let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
         if min.max(max.unwrap_or(0)) > PHOTON_BOUNCE_MAX {
             let cause = format!("counts more than {PHOTON_BOUNCE_MAX} bounces, which records of photons cannot");
             return Err(Error::setting("path_set", self.path_set, cause));
         }
-        let seen = match (self.direct_photons, self.final_gather) {
-            (true, _) => "L[SG]*E",
-            (false, false) => "LD?[SG]*E",
-            (false, true) => "L[SG]*E|LD[SG]*E|LD[SG]*D[SG]*E",
+        let seen = match (self.direct_photons, self.final_gather, has_media) {
+            (true, _, _) => "L[SG]*E",
+            (false, false, false) => "LD?[SG]*E",
+            (false, true, false) => "L[SG]*E|LD[SG]*E|LD[SG]*D[SG]*E",
+            (false, false, true) => "L[DV]?[SG]*E",
+            (false, true, true) => "L[SG]*E|L[DV][SG]*E|L[DV][SG]*D[SG]*E",
         };
         let seen: PathSet = seen.parse()?;
         if !self.needs_photons() {

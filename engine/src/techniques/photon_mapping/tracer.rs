@@ -12,6 +12,9 @@
 use std::sync::Arc;
 
 use super::kernel::KernelSettings;
+use super::path_classes::PathClasses;
+use super::volume::footprint::EventKernelSettings;
+use super::volume::{Room, VolumeOptions, VolumePass, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
@@ -35,6 +38,8 @@ const BOUNCES_PER_SUBMISSION: usize = 8;
 const RECORDS_PER_PHOTON: u64 = 4;
 /// Tells the photons' random numbers from those of eye paths.
 const PHOTON_SEED: u32 = 0x7068_6f74;
+/// Length of the pieces that ways are stored in, as a share of the diagonal of the scene's box: boxes of long ones hold much beside them.
+const WAY_PIECE_SHARE: f32 = 1.0 / 16.0;
 /// Scatterings that photons are followed through at most, so that none is followed for ever between lossless surfaces.
 const BOUNCES_MAX: u32 = 4096;
 
@@ -46,7 +51,7 @@ pub struct PhotonCounts {
     pub emitted: u64,
     /// Photons that left the scene.
     pub escaped: u64,
-    /// Photons that ended on a surface: by roulette, where nothing is scattered, or after the last bounce.
+    /// Photons that ended on a surface or in a medium: by roulette, where nothing is scattered, or after the last bounce.
     pub absorbed: u64,
     /// Rays traced.
     pub rays: u64,
@@ -54,6 +59,10 @@ pub struct PhotonCounts {
     pub deposits: u64,
     /// Those that were not, since their footprint is degenerate.
     pub without_kernel: u64,
+    /// Collisions with media.
+    pub collisions: u64,
+    /// Those that were stored.
+    pub events: u64,
 }
 
 impl std::ops::AddAssign for PhotonCounts {
@@ -64,6 +73,8 @@ impl std::ops::AddAssign for PhotonCounts {
         self.rays += other.rays;
         self.deposits += other.deposits;
         self.without_kernel += other.without_kernel;
+        self.collisions += other.collisions;
+        self.events += other.events;
     }
 }
 
@@ -174,6 +185,8 @@ impl Append for PhotonAppend {
 pub(in crate::techniques) struct Traced {
     /// Records in [`PhotonTracer::records`].
     pub records: u32,
+    /// Those in [`PhotonTracer::events`].
+    pub events: u32,
     pub counts: PhotonCounts,
     pub timings: Vec<Timings>,
 }
@@ -183,6 +196,8 @@ pub(in crate::techniques) struct Tracing {
     pass: u32,
     /// None for deposits that have none.
     kernel: Option<KernelSettings>,
+    /// Kernels of events in media, if there are some.
+    event_kernel: Option<EventKernelSettings>,
     /// First photon of the wave under way, or of the next one.
     first_photon: u32,
     wave: Option<(WalkKey, WaveInFlight)>,
@@ -193,6 +208,14 @@ impl Tracing {
     /// The timings of the submissions since they were taken last.
     pub fn take_timings(&mut self) -> Vec<Timings> {
         std::mem::take(&mut self.traced.timings)
+    }
+
+    /// With kernels so made for events in media.
+    pub fn with_event_kernel(self, kernel: EventKernelSettings) -> Self {
+        Self {
+            event_kernel: Some(kernel),
+            ..self
+        }
     }
 
     /// What has been traced.
@@ -225,19 +248,41 @@ struct Kit {
     capacity: u32,
     /// [`GpuScene::emission_choice`].
     emission: Option<TexelView>,
+    /// Only in scenes with media.
+    volume: Option<VolumeTrace>,
+    /// Of expressions: successors of classes, and those by scattering in media.
+    classes: Option<(Buffer, [u32; 2])>,
 }
 
 /// The stages of a wave of photons.
 struct PhotonStages<'a> {
     kit: &'a Kit,
     key: WalkKey,
-    /// Record of the wave's first deposit.
+    /// Record of the wave's first deposit on a surface, and of its first one in a medium.
     first: u32,
+    first_event: u32,
     kernel: Option<&'a KernelSettings>,
+    event_kernel: Option<&'a EventKernelSettings>,
 }
 
 impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
+        Self::in_media(gpu, scene, plan, append, None, false)
+    }
+
+    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep the ways instead of the collisions.
+    pub(super) fn in_media(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        plan: PhotonPlan,
+        append: Box<dyn Append>,
+        classes: Option<&PathClasses>,
+        stores_ways: bool,
+    ) -> Result<Self> {
+        let media = VolumeOptions {
+            has_classes: classes.is_some(),
+            stores_ways,
+        };
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let has_differentials = plan.follows_footprints;
         let emit = emission_spec!(photon_emit, scene, {
@@ -255,13 +300,15 @@ impl PhotonTracer {
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
             even_survival: plan.even_survival,
+            has_media: profile.media.any(),
+            has_classes: classes.is_some(),
             ..Default::default()
         });
         let wanted = plan.photons.next_multiple_of(WALK_GROUP);
         let slots = wanted.min(default_slots(gpu)).min(slots_of_device(gpu));
         let needs = WaveNeeds {
             waiting: true,
-            media: false,
+            media: profile.media.any(),
             airlight: false,
         };
         let options = WalkOptions {
@@ -276,6 +323,8 @@ impl PhotonTracer {
         let quarters = append.quarters();
         let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
+        let volume = || VolumeTrace::new(gpu, &scene, &plan, media, slots);
+        let volume = profile.media.any().then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
             kit: Kit {
@@ -291,6 +340,14 @@ impl PhotonTracer {
                 records: record_texels(gpu, capacity, quarters)?,
                 capacity,
                 emission: scene.emission_choice(gpu)?,
+                volume,
+                classes: match classes {
+                    Some(classes) => {
+                        let words = gpu.buffer_with("photon classes", Category::Work, &classes.next)?;
+                        Some((words, classes.next_in_media()))
+                    }
+                    None => None,
+                },
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
@@ -311,9 +368,18 @@ impl PhotonTracer {
         &self.kit.records
     }
 
+    /// The events in media of the last pass, in the same order; none in scenes without media.
+    pub fn events(&self) -> Option<&TexelView> {
+        self.kit.volume.as_ref().map(VolumeTrace::events)
+    }
+
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let kit = &self.kit;
-        let mut all = vec![kit.emit.info(), kit.scatter.info(), kit.append.pipeline()];
+        let mut all = vec![kit.emit.info(), kit.scatter.info()];
+        match &kit.volume {
+            Some(volume) => all.extend(volume.pipelines()),
+            None => all.push(kit.append.pipeline()),
+        }
         all.extend(self.walker.trace_pipelines());
         all.extend(self.walker.compaction_pipelines());
         all
@@ -321,7 +387,12 @@ impl PhotonTracer {
 
     /// Traces the photons of a pass with kernels so made, if their deposits have some.
     pub fn trace(&mut self, pass: u32, kernel: Option<&KernelSettings>) -> Result<Traced> {
-        let mut tracing = self.begin(pass, kernel);
+        let tracing = self.begin(pass, kernel);
+        self.finish(tracing)
+    }
+
+    /// Traces the photons that are left of a pass.
+    pub fn finish(&mut self, mut tracing: Tracing) -> Result<Traced> {
         while !self.advance(&mut tracing)? {}
         Ok(tracing.traced)
     }
@@ -331,6 +402,7 @@ impl PhotonTracer {
         Tracing {
             pass,
             kernel: kernel.copied(),
+            event_kernel: None,
             first_photon: 0,
             wave: None,
             traced: Traced::default(),
@@ -360,7 +432,9 @@ impl PhotonTracer {
             kit: &self.kit,
             key: *key,
             first: tracing.traced.records,
+            first_event: tracing.traced.events,
             kernel: tracing.kernel.as_ref(),
+            event_kernel: tracing.event_kernel.as_ref(),
         };
         self.walker.advance(wave, &mut stages)?;
         tracing.traced.timings.append(&mut wave.take_timings());
@@ -377,12 +451,20 @@ impl PhotonTracer {
     fn end_wave(&mut self, tracing: &mut Tracing, photons: u32, walked: &Walked) -> Result<bool> {
         let counters = self.kit.counters_readback.read::<Counters>(0, 1)?[0];
         let traced = &mut tracing.traced;
-        // What waits are the deposits with a kernel.
-        let records = u32::try_from(walked.waited).unwrap_or(u32::MAX);
+        let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
+        let [absorbed, events] = volume.unwrap_or_default();
+        // What waits are the deposits with a kernel, and in scenes with media what comes from these besides.
+        let records = match volume {
+            Some(_) => counters.deposits - counters.without_kernel,
+            None => u32::try_from(walked.waited).unwrap_or(u32::MAX),
+        };
         traced.records = traced.records.saturating_add(records);
+        traced.events = traced.events.saturating_add(events);
+        traced.counts.events += u64::from(events);
+        traced.counts.collisions += walked.media.collisions;
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
-        traced.counts.absorbed += u64::from(counters.absorbed);
+        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
@@ -390,8 +472,16 @@ impl PhotonTracer {
             return Ok(false);
         }
         traced.counts.emitted = u64::from(self.plan.photons);
-        if traced.records <= self.kit.capacity {
+        let events_fit = self
+            .kit
+            .volume
+            .as_ref()
+            .is_none_or(|volume| traced.events <= volume.capacity());
+        if traced.records <= self.kit.capacity && events_fit {
             return Ok(true);
+        }
+        if let Some(volume) = self.kit.volume.as_mut().filter(|_| !events_fit) {
+            volume.grow(&self.gpu, traced.events)?;
         }
         let quarters = self.kit.append.quarters();
         let (needed, most) = (u64::from(traced.records), records_of_device(&self.gpu, quarters));
@@ -404,9 +494,11 @@ impl PhotonTracer {
                 instead: self.kit.append.fewer().into(),
             });
         }
-        let capacity = (needed + needed / 4).min(most) as u32;
-        self.kit.records = record_texels(&self.gpu, capacity, quarters)?;
-        self.kit.capacity = capacity;
+        if traced.records > self.kit.capacity {
+            let capacity = (needed + needed / 4).min(most) as u32;
+            self.kit.records = record_texels(&self.gpu, capacity, quarters)?;
+            self.kit.capacity = capacity;
+        }
         let timings = std::mem::take(&mut traced.timings);
         *traced = Traced {
             timings,
@@ -423,12 +515,14 @@ impl Kit {
             photon_counters: self.counters.view(),
             photon_differentials: self.differentials.view(),
             photon_records: self.records.buffer().view(),
+            photon_class_successors: self.classes.as_ref().map_or(&self.counters, |(words, _)| words).view(),
         }
     }
 }
 
 impl WalkStages for PhotonStages<'_> {
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.reset(pass))?;
         pass.fill(self.kit.counters.view(), 0)
     }
 
@@ -455,6 +549,20 @@ impl WalkStages for PhotonStages<'_> {
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let (kit, kernel) = (self.kit, self.kernel);
         let [lower, upper] = kit.scene.bounds();
+        if let Some(volume) = &kit.volume {
+            let told = VolumePass {
+                key: self.key,
+                first_deposit: kit.stored.first_bounce,
+                last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
+                flux_scale: flux_scale(&kit.scene) as f32,
+                piece: WAY_PIECE_SHARE * (upper - lower).length(),
+                classes: kit.classes.as_ref().map_or([0; 2], |(_, in_media)| *in_media),
+                kernel: self.event_kernel.copied(),
+            };
+            recorder.pass("photon: medium", |pass| {
+                volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)
+            })?;
+        }
         let push = photon_scatter::Push {
             scene_lower: lower.to_array(),
             last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
@@ -487,6 +595,19 @@ impl WalkStages for PhotonStages<'_> {
         let kit = self.kit;
         recorder.pass("photon: append", |pass| {
             let own = kit.wave_set();
+            if let Some(volume) = &kit.volume {
+                let rooms = [
+                    Room {
+                        first: self.first,
+                        capacity: kit.capacity,
+                    },
+                    Room {
+                        first: self.first_event,
+                        capacity: volume.capacity(),
+                    },
+                ];
+                return volume.record_append(pass, bounce, &kit.differentials, &own, rooms);
+            }
             kit.append
                 .append(pass, bounce, &kit.scene, &own, self.first, kit.capacity)?;
             stage_barrier(pass);
@@ -495,6 +616,10 @@ impl WalkStages for PhotonStages<'_> {
     }
 
     fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.kit
+            .volume
+            .as_ref()
+            .map_or(Ok(()), |volume| volume.read_back(pass))?;
         pass.copy(self.kit.counters.view(), self.kit.counters_readback.view())
     }
 }
@@ -527,9 +652,9 @@ fn record_texels(gpu: &Gpu, records: u32, of_record: u32) -> Result<TexelView> {
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "PM-PH-1",
-        name: "photon tracing on surfaces, from every kind of light",
+        name: "photon tracing from every kind of light",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Surfaces only; unlit surfaces send no photons.",
+        limits: "Unlit surfaces and media that emit send no photons.",
         sources: &[
             sources::JENSEN_2001.whole(),
             sources::FABIANOWSKI_2011.at("§3.4.1 and §5.2.3"),

@@ -178,6 +178,18 @@ impl PathSet {
         }
     }
 
+    /// A set by its automaton: of each state seven successors, four bits each, and the accepting states. States stay as they are, so that the result is not in the
+    /// one form that equal sets otherwise share.
+    pub(crate) fn of_states(successors: [u32; STATES], accepting: u32) -> Self {
+        Self {
+            min_bounces: 0,
+            max_bounces: None,
+            // Of seven successors.
+            successors: successors.map(|word| word & NO_SUCCESSORS),
+            accepting,
+        }
+    }
+
     /// The words of a language that have `min`..=`max` events.
     fn normalized(min: u32, max: Option<u32>, dfa: &Dfa) -> Result<Self> {
         if max.is_some_and(|max| max < min) {

@@ -1,0 +1,236 @@
+//! What eye paths see of a volume map along their ways through media: the first part of the stage between arrival and scattering, in scenes with media.
+
+use std::sync::OnceLock;
+
+use super::VolumeEstimate;
+use super::map::EventMap;
+use crate::gpu::shaders::constants::{LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS};
+use crate::gpu::shaders::sets::WaveSet;
+use crate::gpu::shaders::techniques::photon_mapping::photon_beam;
+use crate::gpu::shaders::types::BeamWay;
+use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, wide_counter};
+use crate::techniques::photon_mapping::gather::GatherCounts;
+use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
+use crate::techniques::photon_mapping::settings::PhotonSettings;
+use crate::transport::{GpuScene, PathSet};
+use crate::walk::{Places, WalkKey, stage_barrier};
+use crate::{Error, Result};
+
+/// Nodes and events of a query, at most: beside a walk through a grid, its loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
+const BEAM_QUOTA: u32 = 32_768;
+
+type Counters = photon_beam::BeamCounters;
+
+/// The kernel, with what it keeps of ways.
+pub(in crate::techniques::photon_mapping) struct Beam {
+    gpu: Gpu,
+    kernel: ComputePipeline<photon_beam::Kernel>,
+    /// For places that a quota stopped: made when it is first needed.
+    linear: (Box<photon_beam::Spec>, OnceLock<ComputePipeline<photon_beam::Kernel>>),
+    ways: Buffer,
+    asked: Buffer,
+    counters: Buffer,
+    counters_readback: Buffer,
+    /// Of eye paths that ask at all, and that ask in media, a bit each.
+    states: u32,
+    volume_states: u32,
+    bounces: [u32; 2],
+    /// [`PathClasses::asks`].
+    classes: [u32; ASKING_STATES],
+}
+
+/// Queries of one map, to be recorded with a wave.
+pub(in crate::techniques::photon_mapping) struct BeamStage<'a> {
+    pub beam: &'a Beam,
+    pub map: &'a EventMap,
+    /// Of stored fluxes, in W a photon.
+    pub scale: f32,
+    /// Of beams, m.
+    pub radius: f32,
+}
+
+/// Which eye paths ask, and for what.
+#[derive(Clone, Copy)]
+pub(in crate::techniques::photon_mapping) struct BeamAsk<'a> {
+    pub eye: &'a PathSet,
+    /// Of an expression.
+    pub classes: Option<&'a PathClasses>,
+    /// Of paths that ask on surfaces, a bit each.
+    pub surface_states: u32,
+    /// The path set bounds the number of scatterings.
+    pub counts_bounces: bool,
+}
+
+impl Beam {
+    /// For up to `slots` eye paths at once.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        settings: &PhotonSettings,
+        asking: BeamAsk<'_>,
+        slots: u32,
+    ) -> Result<Self> {
+        let BeamAsk {
+            eye,
+            classes,
+            surface_states,
+            counts_bounces,
+        } = asking;
+        let profile = scene.profile();
+        let spec = |linear| photon_beam::Spec {
+            has_absorption: profile.has_absorption,
+            has_instances: profile.keeps_instances,
+            has_path_automaton: eye.has_automaton(),
+            has_grids: profile.media.heterogeneous,
+            has_homogeneous: profile.media.homogeneous,
+            sampler_kind: settings.sampler as u32,
+            profile: settings.profile as u32,
+            marches: settings.volume == VolumeEstimate::March,
+            beams: settings.volume == VolumeEstimate::Beams,
+            compact_quota: settings.query_quota.min(BEAM_QUOTA),
+            counts_bounces,
+            has_classes: classes.is_some(),
+            linear,
+            ..Default::default()
+        };
+        let asked = if profile.media.heterogeneous { slots } else { 1 };
+        let work = |name: &str, bytes: usize, count: u32| {
+            gpu.buffer(&BufferDesc::storage(
+                name,
+                bytes as u64 * u64::from(count),
+                Category::Work,
+            ))
+        };
+        let bytes = size_of::<Counters>() as u64;
+        let volume_states = match classes {
+            Some(classes) => classes.asking()[1],
+            None if settings.direct_photons => surface_states,
+            None => states_that_go_on_by(eye, LOBE_VOLUME.trailing_zeros()),
+        };
+        Ok(Self {
+            gpu: gpu.clone(),
+            kernel: gpu.compute_pipeline(&spec(false))?,
+            linear: (Box::new(spec(true)), OnceLock::new()),
+            ways: work("beam ways", size_of::<BeamWay>(), slots)?,
+            asked: work("beam asked", size_of::<f32>(), asked)?,
+            counters: work("beam counters", bytes as usize, 1)?,
+            counters_readback: gpu.buffer(&BufferDesc::readback("beam counters", bytes))?,
+            states: surface_states | volume_states,
+            volume_states,
+            bounces: [
+                settings.path_set.min_bounces(),
+                settings.path_set.max_bounces().unwrap_or(u32::MAX),
+            ],
+            classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
+        })
+    }
+
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        vec![self.kernel.info()]
+    }
+
+    /// What is left of light from the surfaces that paths have met, by place.
+    pub fn ways(&self) -> BufferView<'_> {
+        self.ways.view()
+    }
+
+    /// Counts of the last wave: ways that asked, and events that they met.
+    pub fn counts(&self) -> Result<GatherCounts> {
+        let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
+        Ok(GatherCounts {
+            queries: u64::from(counters.queries),
+            photons: wide_counter(counters.events),
+        })
+    }
+}
+
+impl BeamStage<'_> {
+    fn set(&self) -> photon_beam::Set1<'_> {
+        photon_beam::Set1 {
+            event_pairs: &self.map.pairs,
+            event_records: &self.map.events,
+            photon_event_root: self.map.root.view(),
+            beam_counters: self.beam.counters.view(),
+            photon_beam_ways: self.beam.ways.view(),
+            photon_beam_asked: self.beam.asked.view(),
+        }
+    }
+
+    fn push(&self, scene: &GpuScene, key: WalkKey) -> photon_beam::Push {
+        photon_beam::Push {
+            key,
+            surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
+            states: self.beam.states,
+            volume_states: self.beam.volume_states,
+            least_bounces: self.beam.bounces[0],
+            most_bounces: self.beam.bounces[1],
+            scale: self.scale,
+            radius: self.radius,
+            classes: self.beam.classes,
+            ..Default::default()
+        }
+    }
+
+    pub fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.update(self.beam.counters.view(), &[Counters::default()])
+    }
+
+    pub fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.copy(self.beam.counters.view(), self.beam.counters_readback.view())
+    }
+
+    /// Records queries at all places that have none yet.
+    pub fn record(&self, pass: &mut Pass<'_>, scene: &GpuScene, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+        let (set, of_scene, media) = (self.set(), scene.scene_set(), scene.media_set());
+        let push = self.push(scene, places.key);
+        pass.dispatch_indirect(&self.beam.kernel, &[wave, &set, &of_scene, &media], &push, places.items)?;
+        stage_barrier(pass);
+        Ok(())
+    }
+
+    pub fn prepare_stopped(&self) -> Result<()> {
+        let (spec, made) = &self.beam.linear;
+        if made.get().is_none() {
+            let linear = self.beam.gpu.compute_pipeline(spec.as_ref())?;
+            made.get_or_init(|| linear);
+        }
+        Ok(())
+    }
+
+    /// Records the events `first` up to `last` at stopped places from `first_place` on.
+    pub fn record_linear(
+        &self,
+        pass: &mut Pass<'_>,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        key: WalkKey,
+        [first_place, places]: [u32; 2],
+        [first, last]: [u32; 2],
+    ) -> Result<()> {
+        let linear = self.beam.linear.1.get().ok_or_else(|| Error::Internal {
+            what: "volume map".into(),
+            fault: "has stopped queries without the kernel for them".into(),
+        })?;
+        let push = photon_beam::Push {
+            first_place,
+            first,
+            last,
+            ..self.push(scene, key)
+        };
+        let (set, of_scene, media) = (self.set(), scene.scene_set(), scene.media_set());
+        let groups = [linear.groups_for(places), 1, 1];
+        pass.dispatch(linear, &[wave, &set, &of_scene, &media], &push, groups)?;
+        stage_barrier(pass);
+        Ok(())
+    }
+}
+
+/// The states of eye paths that may go on by a lobe, a bit each.
+fn states_that_go_on_by(eye: &PathSet, symbol: u32) -> u32 {
+    let goes_on = |word: &u32| word >> (PATH_SET_STATE_BITS * symbol) & PATH_SET_DEAD != PATH_SET_DEAD;
+    let states = eye.successors();
+    (0..states.len()).fold(0, |bits, state| bits | u32::from(goes_on(&states[state])) << state)
+}

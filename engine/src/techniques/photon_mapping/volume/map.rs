@@ -1,0 +1,212 @@
+//! The volume map: a compact hierarchy over the kernels of a pass's events, and the events in the order of its leaves; built by device or host.
+//!
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2, §6.2 and §7.4.2, whose leaves hold sixteen events.
+//!
+//! Guarantees: a ray's query visits every kernel that it pierces; the same bytes on any number of threads, by host and device.
+
+use super::event::{EventWords, MEDIUM_WORD, event_box, unpack_beam, unpack_event};
+use crate::accel::Aabb;
+use crate::accel::lbvh::SortedCodes;
+use crate::accel::morton::MORTON_30_AXIS_BITS;
+use crate::accel::photon_map::compact_bvh::CompactBvh;
+use crate::accel::photon_map::complete_bvh::CompleteBvh;
+use crate::accel::photon_map::device::{MapBuffers, MapBuilder};
+use crate::accel::photon_map::merge::merged_hierarchy;
+use crate::gpu::ash::vk;
+use crate::gpu::shaders::constants::{
+    COMPACT_NOTHING, EVENT_LEAF_END, EVENT_QUARTERS, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE,
+};
+use crate::gpu::shaders::techniques::photon_mapping::{photon_event_boxes, photon_event_leaves};
+use crate::gpu::shaders::types::CompactRoot;
+use crate::gpu::{Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Submission, TexelView};
+use crate::techniques::photon_mapping::settings::MapBuild;
+use crate::{Error, Result};
+use rayon::prelude::*;
+
+/// Events of a leaf, at most, where their codes tell them apart.
+const LEAF_SIZE: u32 = 16;
+
+/// A map on the device.
+#[derive(Debug)]
+pub(in crate::techniques::photon_mapping) struct EventMap {
+    /// Where queries begin: a [`CompactRoot`].
+    pub root: Buffer,
+    pub pairs: TexelView,
+    pub events: TexelView,
+    pub count: u32,
+}
+
+/// Builds maps.
+pub(in crate::techniques::photon_mapping) struct EventMaps {
+    gpu: Gpu,
+    /// None for maps that the host builds.
+    device: Option<DeviceEventMaps>,
+    /// Of the device: more events than it can, or memory has room for, go to the host.
+    or_host: bool,
+    /// Records are pieces of ways.
+    beams: bool,
+}
+
+struct DeviceEventMaps {
+    builder: MapBuilder,
+    boxes: ComputePipeline<photon_event_boxes::Kernel>,
+    leaves: ComputePipeline<photon_event_leaves::Kernel>,
+    memory: Option<(MapBuffers, TexelView)>,
+}
+
+impl EventMaps {
+    /// # Errors
+    /// As [`Gpu::compute_pipeline`].
+    pub fn new(gpu: &Gpu, build: MapBuild, beams: bool) -> Result<Self> {
+        let device = match build {
+            MapBuild::Host => None,
+            MapBuild::Auto | MapBuild::Device => Some(DeviceEventMaps {
+                builder: MapBuilder::new(gpu)?,
+                boxes: gpu.compute_pipeline(&photon_event_boxes::Spec { beams })?,
+                leaves: gpu.compute_pipeline(&Default::default())?,
+                memory: None,
+            }),
+        };
+        Ok(Self {
+            gpu: gpu.clone(),
+            device,
+            or_host: build == MapBuild::Auto,
+            beams,
+        })
+    }
+
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let Some(device) = &self.device else { return Vec::new() };
+        let mut all = vec![device.boxes.info()];
+        all.extend(device.builder.pipelines());
+        all.push(device.leaves.info());
+        all
+    }
+
+    /// A map of the first `count` of `events`, and the submission that builds it, if the device does. Maps of beams are told their radius, m.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] for more events than the device can build over where it is to, [`Error::OutOfMemory`], [`Error::DeviceLost`].
+    pub fn make(&mut self, events: &TexelView, count: u32, radius: f64) -> Result<(EventMap, Option<Submission>)> {
+        let radius = radius as f32;
+        if let Some(device) = self.device.as_mut().filter(|_| count > 0) {
+            match device.build(&self.gpu, events, count, radius) {
+                Err(Error::LimitExceeded { .. } | Error::OutOfMemory { .. }) if self.or_host => {}
+                built => return built.map(|(map, submission)| (map, Some(submission))),
+            }
+        }
+        let words: Vec<EventWords> = self.gpu.read(events.buffer().view(), count as usize)?;
+        Ok((self.by_host(&words, radius)?, None))
+    }
+
+    fn by_host(&self, events: &[EventWords], radius: f32) -> Result<EventMap> {
+        let boxes: Vec<Aabb> = events
+            .par_iter()
+            .map(|words| {
+                if self.beams {
+                    let beam = unpack_beam(words);
+                    return event_box(beam.start, beam.end, radius);
+                }
+                let event = unpack_event(words);
+                event_box(event.position, event.position, event.radius)
+            })
+            .collect();
+        let sorted = SortedCodes::of_boxes(&boxes, MORTON_30_AXIS_BITS);
+        let complete = CompleteBvh::new(&merged_hierarchy(&boxes, &sorted, LEAF_SIZE, |_| {}))?;
+        let compact = CompactBvh::encode(&complete).map_err(|fault| Error::Internal {
+            what: "volume map".into(),
+            fault: format!("is not tight: {fault:?}"),
+        })?;
+        let leaves = complete.order.par_iter().zip(&complete.ends);
+        let ordered: Vec<EventWords> = leaves
+            .map(|(index, ends)| {
+                let mut words = events[*index as usize];
+                words[0][MEDIUM_WORD] |= if *ends { EVENT_LEAF_END } else { 0 };
+                words
+            })
+            .collect();
+        let root = CompactRoot {
+            lower: compact.root.bounds.lower.to_array(),
+            reference: compact.root.reference.unwrap_or(COMPACT_NOTHING),
+            upper: compact.root.bounds.upper.to_array(),
+            padding: 0,
+        };
+        let texels = |name, data: &[u8]| {
+            self.gpu
+                .texels_with(name, Category::Work, vk::Format::R32G32B32A32_UINT, data)
+        };
+        Ok(EventMap {
+            root: self.gpu.buffer_with("volume map root", Category::Work, &[root])?,
+            pairs: texels("volume map", bytemuck::cast_slice(&compact.pairs))?,
+            events: texels("volume map events", bytemuck::cast_slice(&ordered))?,
+            count: events.len() as u32,
+        })
+    }
+}
+
+impl DeviceEventMaps {
+    /// Submits the build of a map of the first `count` of `events`, at least one. It lasts until the next build.
+    fn build(&mut self, gpu: &Gpu, events: &TexelView, count: u32, radius: f32) -> Result<(EventMap, Submission)> {
+        let enough = |memory: &(MapBuffers, TexelView)| memory.0.capacity() >= count;
+        if !self.memory.as_ref().is_some_and(enough) {
+            self.memory = None;
+            let most = self.builder.max_boxes().max(count);
+            // More than are there now, so that the next pass has room as well.
+            let roomy = count.saturating_add(count / 4).min(most);
+            let made = match self.memory_of(gpu, roomy) {
+                Err(Error::OutOfMemory { .. }) if roomy > count => self.memory_of(gpu, count),
+                made => made,
+            };
+            self.memory = Some(made?);
+        }
+        let Some((tree, ordered)) = &self.memory else {
+            return Err(Error::Internal {
+                what: "volume map".into(),
+                fault: "has no memory".into(),
+            });
+        };
+        let mut recorder = gpu.recorder("volume map")?;
+        recorder.pass("volume map: boxes", |pass| {
+            self.builder.record_begin(pass, tree, LEAF_SIZE)?;
+            let set = photon_event_boxes::Set0 {
+                event_records_in: events,
+                lbvh_boxes: tree.boxes.buffer().view(),
+                lbvh_state_block: tree.bounds.view(),
+            };
+            let groups = count.div_ceil(LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION);
+            let push = photon_event_boxes::Push { count, radius };
+            pass.dispatch(&self.boxes, &[&set], &push, [groups, 1, 1])?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+            Ok(())
+        })?;
+        self.builder.record(&mut recorder, tree, count)?;
+        recorder.pass("volume map: events", |pass| {
+            let set = photon_event_leaves::Set0 {
+                event_records_in: events,
+                map_order: self.builder.order(tree, count),
+                map_retained: &tree.retained,
+                event_map_records: ordered.buffer().view(),
+            };
+            let groups = [self.leaves.groups_for(count), 1, 1];
+            pass.dispatch(&self.leaves, &[&set], &photon_event_leaves::Push { count }, groups)?;
+            pass.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
+            Ok(())
+        })?;
+        let map = EventMap {
+            root: tree.root.clone(),
+            pairs: tree.pairs.clone(),
+            events: ordered.clone(),
+            count,
+        };
+        Ok((map, recorder.submit()?))
+    }
+
+    fn memory_of(&self, gpu: &Gpu, capacity: u32) -> Result<(MapBuffers, TexelView)> {
+        let texels = u64::from(capacity) * u64::from(EVENT_QUARTERS);
+        let format = vk::Format::R32G32B32A32_UINT;
+        Ok((
+            self.builder.buffers(capacity)?,
+            gpu.storage_texels("volume map events", Category::Work, format, texels)?,
+        ))
+    }
+}

@@ -1,0 +1,167 @@
+//! Photons in participating media: events where they collide, the map of these, and what eye paths see of them along their ways.
+//!
+//! Sources: H. W. Jensen and P. H. Christensen, "Efficient Simulation of Light Transport in Scenes with Participating Media Using Photon Maps", SIGGRAPH 1998;
+//! W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate for Volumetric Photon Mapping", Computer Graphics Forum 27(2), 2008; B. Fabianowski,
+//! "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, chapter 7; C. Knaus and M. Zwicker, "Progressive Photon Mapping: A
+//! Probabilistic Approach", ACM TOG 30(3), 2011.
+//!
+//! Nothing of it is made for scenes without media. Bias: kernels blur, and lose the light of media by walls and boundaries as far as they reach, since there are
+//! no events beyond; a thin wall lets them through. Both fade as kernels shrink.
+
+mod beam;
+pub mod event;
+pub mod footprint;
+mod map;
+mod trace;
+
+pub(super) use beam::{Beam, BeamAsk, BeamStage};
+pub(super) use map::{EventMap, EventMaps};
+pub(super) use trace::{Room, VolumeOptions, VolumePass, VolumeTrace};
+
+use crate::catalogue::{Bias, Role, Row, sources};
+
+/// How events are seen along eye paths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VolumeEstimate {
+    /// The beam estimate: disks across the ray, one query for all of it.
+    Ray,
+    /// Beams: ways of photons through homogeneous media as far as the next surface, each seen where the ray passes it.
+    Beams,
+    /// Balls at places of the ray that lie as far apart as they are wide, from a first one by chance.
+    March,
+}
+
+/// How wide events' kernels are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VolumeKernel {
+    /// All alike.
+    Fixed,
+    /// As the photon's footprint is.
+    Footprint,
+}
+
+const BIAS: Bias = Bias::Consistent(
+    "kernels blur events, and lose light by walls and boundaries or leak it through thin ones, until they have shrunk",
+);
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-VOL-7",
+        name: "beam estimate: one query of the volume map per ray, in corrected units (PM-VOL-6 are the original ones)",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Single scattering is the eye paths' by default; emissive media are refused; in a grid light from an event passes by chance, which costs noise.",
+        sources: &[
+            sources::FABIANOWSKI_2011.at("§7.1"),
+            sources::JAROSZ_2008.whole(),
+            sources::JENSEN_CHRISTENSEN_1998.whole(),
+            sources::KNAUS_ZWICKER_2011.whole(),
+        ],
+        bias: Some(BIAS),
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_event.glsl",
+            "shaders/techniques/photon_mapping/photon_event_boxes.comp",
+            "shaders/techniques/photon_mapping/photon_event_leaves.comp",
+        ],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/event.rs::single_scattering_has_its_constants_and_original_units_do_not",
+            "engine/src/techniques/photon_mapping/volume/event.rs::records_come_back",
+            "engine/src/techniques/photon_mapping/volume/event.rs::boxes_hold_what_rays_find_within_the_radius",
+            "tests/tests/twins/photons.rs::records_of_events_agree_with_their_twins",
+            "tests/tests/photon/volume.rs::airlight_has_its_six_constants",
+            "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
+            "tests/tests/photon/volume.rs::grids_agree_with_the_path_tracer",
+            "tests/tests/photon/volume.rs::glass_in_fog_agrees_with_the_path_tracer",
+            "tests/tests/photon/volume.rs::errors_fall_with_passes",
+            "tests/tests/photon/volume.rs::lengths_times_eight_give_a_sixty_fourth",
+            "tests/tests/photon/volume.rs::beams_that_a_quota_stops_go_through_all_records",
+        ],
+        settings: &["volume", "volume_radius", "reduction"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-PHOTON-BEAMS",
+        name: "photon beams: long ones, seen by rays under kernels of one dimension",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Homogeneous media alone; a way has no light beyond sixteen mean free paths; rays along a beam are noise.",
+        sources: &[sources::JAROSZ_2011.whole(), sources::KNAUS_ZWICKER_2011.whole()],
+        bias: Some(BIAS),
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_medium.comp",
+        ],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/event.rs::beams_have_the_airlight_integral",
+            "tests/tests/photon/volume.rs::beams_have_the_six_constants",
+            "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
+            "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
+        ],
+        settings: &["volume"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-VOL-5",
+        name: "marched estimate of the volume map",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Noisier than the beam estimate for the same events; places lie as far apart as kernels are wide.",
+        sources: &[
+            sources::FABIANOWSKI_2011.at("§3.4.2.4"),
+            sources::JENSEN_CHRISTENSEN_1998.whole(),
+        ],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/photon_beam.comp"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/event.rs::kernels_integrate_to_one_over_space_and_marches_to_a_disk",
+            "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
+        ],
+        settings: &["volume"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-12",
+        name: "photons that collide in media: stored with what they scatter, roulette by the albedo",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Media that scatter nothing have no collisions.",
+        sources: &[
+            sources::FABIANOWSKI_2011.at("§3.4.1.3 and §7.2.3"),
+            sources::JENSEN_CHRISTENSEN_1998.whole(),
+        ],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_medium.comp",
+            "shaders/techniques/photon_mapping/photon_volume_flags.comp",
+            "shaders/techniques/photon_mapping/photon_volume_append.comp",
+        ],
+        tests: &[
+            "tests/tests/photon/volume.rs::photons_in_media_are_kept_to_the_count",
+            "tests/tests/photon/volume.rs::collisions_are_as_many_as_the_albedo_says",
+            "tests/tests/photon/volume.rs::scenes_without_media_have_nothing_of_it",
+            "tests/tests/photon/volume.rs::threads_never_show_in_media",
+        ],
+        settings: &["photons"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-DE-7",
+        name: "kernels in media as wide as footprints, dampened by a logarithm",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Isotropic, whatever the footprint's form; in grids what has passed is reckoned from the bounds of the density; the unit of the dampening is a ninth of the scene's diagonal, not a metre.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.2, §7.3.1 and §7.3.2")],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/photon_footprint.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::volumes_are_reciprocals_of_the_density_of_collisions",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::dampening_has_its_published_values",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::scattering_keeps_the_expected_volume",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::scaling_the_scene_and_the_unit_scales_the_kernel",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::footprints_without_a_volume_have_the_least_kernel_and_endless_ones_the_greatest",
+            "tests/tests/photon/volume.rs::kernels_from_footprints_hold_as_many_collisions_as_they_should",
+            "tests/tests/photon/volume.rs::kernels_from_footprints_agree_with_the_path_tracer",
+            "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
+        ],
+        settings: &["volume_kernel", "volume_spread", "volume_dampening"],
+        ..Row::of(file!())
+    },
+];

@@ -1,0 +1,344 @@
+#version 460
+// Radiance from the volume map along eye paths' ways through media: beams of photons, each counting where the ray passes it; or events, by the beam estimate, each event whose kernel the ray pierces counting at its closest point; or the
+// marched estimate, kernels of space at places of the ray that lie as far apart as they are wide, the first one by chance. Also what the medium leaves of light from the
+// surface that the path has met, for the surface's query behind it.
+//
+// L = sum_j K(d_j / h_j) / h_j^2 tau(t_j) p(w_j, -v) Phi_j, with Phi_j the flux that the event scatters: the corrected units of the source, where the albedo stands
+// instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam.
+// Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Transmittances are exact in homogeneous media. In a grid one delta tracking a ray finds how far light of each band comes; what lies before counts in
+// full, what lies behind does not: unbiased. One that its quota stops goes on in a later dispatch, before anything is asked. Events count in their own medium alone.
+//
+// A ray's sum has the order of the map's leaves, or of its records. A query that its quota stops leaves nothing and goes through all records instead (LINEAR). A way that
+// path_medium.comp goes through in several rounds is asked for once: `beam_asked` says how far.
+//
+// PM-VOL-5, PM-VOL-7: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.2.4 and 7.1; W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate
+// for Volumetric Photon Mapping", 2008; W. Jarosz, D. Nowrouzezahrai, I. Sadeghi and H. W. Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon
+// Points and Beams", 2011. Deterministic in (seed, pixel, sample) and the map.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/features.glsl"
+#include "transport/media_features.glsl"
+#include "techniques/photon_mapping/photon_event.glsl"
+#include "techniques/photon_mapping/photon_features.glsl"
+#include "techniques/photon_mapping/photon_eye.glsl"
+#include "accel/sphere.glsl"
+
+layout(constant_id = 42) const uint PROFILE = KERNEL_EPANECHNIKOV;
+layout(constant_id = 43) const bool LINEAR = false;  // goes through records, for places that have stopped
+layout(constant_id = 47) const bool MARCHES = false;
+layout(constant_id = 55) const bool BEAMS = false;   // the map holds ways of photons
+
+layout(set = 1, binding = 0) uniform utextureBuffer event_pairs;
+layout(set = 1, binding = 1) uniform utextureBuffer event_records;
+layout(set = 1, binding = 3, scalar) restrict buffer BeamCounters {
+    uint queries;
+    uint events[2];  // kernels that a ray pierced: 64 bits, the low word first
+} beam_counters;
+layout(set = 1, binding = 4, scalar) restrict buffer PhotonBeamWays { BeamWay beam_ways[]; };    // by place
+layout(set = 1, binding = 5, scalar) restrict buffer PhotonBeamAsked { float beam_asked[]; };    // by slot; of scenes with grids
+
+uvec4 compact_quarter(uint index) { return texelFetch(event_pairs, int(index)); }
+uvec4 event_quarter(uint record, uint quarter) { return texelFetch(event_records, int(EVENT_QUARTERS * record + quarter)); }
+bool compact_visit_beam(uint record);
+
+#define COMPACT_BEAM
+#include "accel/compact_bvh.glsl"
+
+layout(set = 1, binding = 2, scalar) restrict readonly buffer PhotonEventRoot { CompactRoot event_root; };
+
+layout(push_constant, scalar) uniform Push {
+    WalkKey key;
+    uint surrounding;    // index of the medium outside all bodies, or NO_MEDIUM
+    uint states;         // of a path that asks, in media or on surfaces, a bit each
+    uint volume_states;  // of one that asks on its way through media
+    uint least_bounces;  // scatterings in all, with that of the event
+    uint most_bounces;
+    float scale;         // of stored fluxes
+    float radius;        // of beams
+    uint first_place;    // of LINEAR
+    uint first;          // of the records that a linear query goes through
+    uint last;
+    uint classes[ASKING_STATES];  // by state of a path: the classes of photons that count on surfaces, and 16 bits higher those that do in media
+} push;
+
+#include "walk/draws.glsl"
+#include "transport/bodies.glsl"
+#include "transport/media_tracking.glsl"
+#include "transport/phase.glsl"
+#include "walk/media.glsl"
+
+// Stands for the round in the key of the random numbers, so that those of ways and shadow rays do not return.
+const uint BEAM_KEY = 0x20000000u;
+// Places of a march within a kernel, at most: it is twice as wide as they lie apart.
+const uint MARCH_PLACES = 3u;
+
+// What the query under way is about.
+struct Beam {
+    vec3 origin;
+    vec3 direction;
+    float from;     // of the part that is asked for
+    float to;
+    float start;    // from where the medium takes from light
+    vec3 reach;
+    uint medium;
+    SceneMedium m;
+    uint classes;   // of photons that count, a bit each, where there are classes
+    uint bounce;    // scatterings between the event and the eye
+    float offset;   // of the places of a march, in their distance
+};
+Beam beam;
+vec3 gathered;
+uint gathered_events;
+
+// What the medium leaves of light at a distance.
+vec3 passed_to(float t) {
+    if (HAS_GRIDS && beam.m.has_grid != 0u) {
+        return vec3(lessThan(vec3(t), beam.reach));
+    }
+    return transmittance(beam.m.sigma_t, t - beam.start);
+}
+
+// Integral of kernel times transmittance along the ray by the march's places, of an event at a distance of t and a squared one of d2 from the ray.
+vec3 marched(float t, float d2, float h) {
+    float half_chord = sqrt(max(h * h - d2, 0.0));
+    float first = ceil((t - half_chord - beam.start) / h - beam.offset);
+    vec3 sum = vec3(0.0);
+    for (uint i = 0u; i < MARCH_PLACES; ++i) {
+        float at = beam.start + (first + float(i) + beam.offset) * h;
+        float along = at - t;
+        if (at > beam.from && at < beam.to) {
+            sum += ball_profile(PROFILE, (d2 + along * along) / (h * h)) * passed_to(at);
+        }
+    }
+    return sum / (h * h);
+}
+
+// Adds a beam's light where the ray passes it.
+void add_beam(uvec4 q0, uvec4 q1) {
+    PhotonBeam b = unpack_beam(q0, q1);
+    vec3 way = b.end - b.start;
+    float reach = length(way);
+    uint bounces = b.bounce + 1u + beam.bounce;
+    bool counts = b.medium == beam.medium && reach > 0.0;
+    if (HAS_CLASSES) {
+        counts = counts && (beam.classes >> b.bounce & 1u) != 0u;
+    }
+    if (COUNTS_BOUNCES) {
+        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
+    }
+    if (counts) {
+        way /= reach;
+        BeamMeeting at = meet_beam(beam.origin, beam.direction, b.start, way);
+        float relative = at.squared / (push.radius * push.radius);
+        if (at.sine > 0.0 && relative < 1.0 && at.along >= 0.0 && at.along < reach && at.t > beam.from && at.t < beam.to) {
+            vec3 passed = passed_to(at.t) * transmittance(beam.m.sigma_t, at.along);
+            float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
+            weight *= phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+            ++gathered_events;
+            gathered += weight * beam.m.sigma_s * passed * b.flux;
+        }
+    }
+}
+
+bool compact_visit_beam(uint record) {
+    uvec4 q0 = event_quarter(record, 0u);
+    uvec4 q1 = event_quarter(record, 1u);
+    if (BEAMS) {
+        add_beam(q0, q1);
+        return !event_ends_leaf(q0);
+    }
+    float radius = uintBitsToFloat(q1.y);
+    vec2 approach = closest_approach(beam.origin, beam.direction, uintBitsToFloat(q0.xyz));
+    uint bounces = (q1.z >> PHOTON_BOUNCE_SHIFT) + 1u + beam.bounce;
+    bool counts = (q0.w & EVENT_MEDIUM_MASK) == beam.medium && approach.y < radius * radius;
+    if (HAS_CLASSES) {
+        counts = counts && (beam.classes >> (q1.z >> PHOTON_BOUNCE_SHIFT) & 1u) != 0u;
+    }
+    if (COUNTS_BOUNCES) {
+        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
+    }
+    if (!MARCHES) {
+        counts = counts && approach.x > beam.from && approach.x < beam.to;
+    }
+    if (counts) {
+        vec3 weight = MARCHES ? marched(approach.x, approach.y, radius)
+            : kernel_profile(PROFILE, approach.y / (radius * radius)) / (radius * radius) * passed_to(approach.x);
+        if (weight != vec3(0.0)) {
+            PhotonEvent e = unpack_event(q0, q1);
+            ++gathered_events;
+            gathered += weight * phase_function(beam.m.phase, beam.m.phase_parameter, e.direction, -beam.direction) * e.flux;
+        }
+    }
+    return !event_ends_leaf(q0);
+}
+
+// Finds how far light of each band comes through the grid, from `from` on; false where the quota has stopped it, at `from`.
+bool walk_through_grid(uvec4 key, float end, inout float from) {
+    GridWalk walk = begin_grid_walk(beam.m, beam.origin, beam.direction, from, end);
+    uint iterations = GRID_WALK_QUOTA;
+    uint outcome = GRID_COLLIDED;
+    while (outcome == GRID_COLLIDED && any(equal(beam.reach, vec3(FAR_AWAY)))) {
+        uvec4 bits = grid_draw(key, walk.draw++);
+        float majorant;
+        outcome = next_tentative_collision(beam.m, 1.0, -log(1.0 - unit_float(bits.x)), walk, iterations, majorant);
+        if (outcome == GRID_COLLIDED) {
+            ++walk.nulls;
+            vec3 real = min(beam.m.sigma_t * (grid_density(beam.m, walk) / majorant), vec3(1.0));
+            bvec3 collides = lessThan(vec3(unit_float(bits.y)), real);
+            beam.reach = mix(beam.reach, min(beam.reach, vec3(walk.entry + walk.t)), collides);
+        }
+    }
+    COUNT_MEDIUM(density_lookups, walk.nulls)
+    from = resumed_start(from, walk.entry + walk.t);
+    return outcome != GRID_STOPPED || from >= end;
+}
+
+// Prepares the query of a place, and notes what comes of light from the surface; false where nothing is asked for on the way. Nor is anything where a quota stops the walk
+// through a grid (`walks`), which goes on another time (`goes_on`).
+bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool walks) {
+    walks = false;
+    uint way_state = asking_state(path);
+    if ((push.states >> way_state & 1u) == 0u) {
+        return false;
+    }
+    MediumState state = MediumState(vec3(0.0), 0.0);
+    if (status.rounds > 0u) {
+        state = walk_medium_states[slot];
+    }
+    Hit hit = load_hit(place);
+    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (hit.triangle != NO_HIT) {
+        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
+    }
+    beam.origin = path.origin;
+    beam.direction = path.direction;
+    beam.start = state.start;
+    beam.to = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start);
+    beam.from = max(state.start, 0.0);
+    beam.bounce = asking_bounce(path);
+    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
+    beam.medium = medium_inside(crossing.interior, push.surrounding);
+    beam.reach = vec3(FAR_AWAY);
+    bool asks = (push.volume_states >> way_state & 1u) != 0u && beam.medium != NO_MEDIUM;
+    if (beam.medium != NO_MEDIUM) {
+        beam.m = load_medium(beam.medium);
+        asks = asks && beam.m.sigma_s != vec3(0.0);
+    }
+    bool asked_before = false;
+    if (HAS_GRIDS) {
+        // Of a ray that has just begun nothing has been asked for; of a way that path_medium.comp goes on with, its surface, too.
+        float asked = state.start > 0.0 ? beam_asked[slot] : 0.0;
+        asked_before = asked >= beam.to;
+        beam.from = max(beam.from, asked);
+        if (!asked_before && beam.medium != NO_MEDIUM && beam.m.has_grid != 0u) {
+            float walked = beam.start;
+            uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), BEAM_KEY + walk_round(slot), push.key.seed);
+            if (goes_on) {
+                walked = beam_ways[place].end;
+                beam.reach = beam_ways[place].reach;
+                key.w ^= floatBitsToUint(walked);
+            }
+            walks = !walk_through_grid(key, beam.to, walked);
+            if (walks) {
+                beam_ways[place] = BeamWay(vec3(0.0), beam.from, beam.reach, walked);
+                return false;
+            }
+        }
+        beam_asked[slot] = max(asked, beam.to);
+    }
+    vec3 surface = vec3(0.0);
+    if (hit.triangle != NO_HIT && !asked_before) {
+        surface = beam.medium != NO_MEDIUM ? passed_to(beam.to) : vec3(1.0);
+        if (HAS_ABSORPTION && crossing.interior != OUTSIDE) {
+            surface *= exp(-load_material(crossing.interior).absorption * (beam.to - beam.from));
+        }
+    }
+    beam_ways[place] = BeamWay(surface, beam.from, beam.reach, beam.to);
+    return asks && beam.from < beam.to;
+}
+
+// Prepares the query of a place again whose way is known.
+void resume_beam(uint slot, uint place, WalkState path) {
+    BeamWay way = beam_ways[place];
+    Hit hit = load_hit(place);
+    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (hit.triangle != NO_HIT) {
+        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
+    }
+    beam.origin = path.origin;
+    beam.direction = path.direction;
+    beam.start = status.rounds > 0u ? walk_medium_states[slot].start : 0.0;
+    beam.from = way.start;
+    beam.to = way.end;
+    beam.reach = way.reach;
+    beam.bounce = asking_bounce(path);
+    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
+    beam.medium = medium_inside(crossing.interior, push.surrounding);
+    beam.m = load_medium(beam.medium);
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x + (LINEAR ? push.first_place : 0u);
+    if (!wave_has_arrived() || place >= status.active_count || (LINEAR && !beam_has_stopped(walk_resume[place]))) {
+        return;
+    }
+    uint resume = BEAM_DONE;
+    if (!LINEAR) {
+        resume = walk_resume[place];
+        if (resume >= BEAM_STOPPED_GATHER_STOPPED && resume <= GATHER_STOPPED && resume != PLACE_SCATTERED) {
+            return;
+        }
+        if (!has_work_left()) {
+            leave_for_later(STALLED_ARRIVAL);
+            return;
+        }
+        walk_resume[place] = BEAM_DONE;
+    }
+    uint slot = load_slot(place);
+    WalkState path = load_walk(slot);
+    if (LINEAR) {
+        resume_beam(slot, place, path);
+    } else {
+        bool walks;
+        bool asks = begin_beam(slot, place, path, resume == BEAM_WALKING, walks);
+        if (walks) {
+            walk_resume[place] = BEAM_WALKING;
+            count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
+            leave_for_later(STALLED_ARRIVAL);
+        }
+        if (!asks) {
+            return;
+        }
+    }
+    if (MARCHES) {
+        uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), BEAM_KEY + walk_round(slot), push.key.seed);
+        beam.offset = unit_float(pcg4d(key).w);
+    }
+    gathered = vec3(0.0);
+    gathered_events = 0u;
+    bool complete = true;
+    if (LINEAR) {
+        for (uint record = push.first; record < push.last; ++record) {
+            compact_visit_beam(record);
+        }
+    } else {
+        // A march's places reach as far beyond the way's ends as kernels do, and count within alone.
+        float far = min(beam.to, largest_component(beam.reach));
+        complete = compact_beam_query(event_root, Ray(beam.origin, beam.from, beam.direction, far));
+        count_work(QUERY_STEP_WORK * compact_steps + GRID_ITERATION_WORK * grid_iterations, QUERY_STEP_WORK * WORK_UNIT);
+    }
+    if (!complete) {
+        walk_resume[place] = BEAM_STOPPED;
+        atomicAdd(status.unfinished, 1u);
+        atomicMax(status.stalled, STALLED_ARRIVAL);
+        return;
+    }
+    if (!LINEAR || push.first == 0u) {
+        atomicAdd(beam_counters.queries, 1u);
+    }
+    COUNT_WIDE(beam_counters.events, gathered_events)
+    walk_gathered[slot].radiance += path.throughput * gathered * push.scale;
+}

@@ -1,0 +1,717 @@
+//! Photons in participating media: counts, closed forms, and the path tracer on equal path sets.
+
+use super::*;
+use clerestory::Error;
+use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase, Projection};
+use clerestory::techniques::photon_mapping::volume::event::PhotonEvent;
+use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
+use clerestory::techniques::photon_mapping::{MapBuild, MappedEvent};
+use clerestory_tests::child::hash_in_child;
+use clerestory_tests::render::{builtin, cuboid};
+use clerestory_tests::statistics::expect_mean_of;
+use clerestory_tests::{gpu, with_gpu};
+use glam::DVec3;
+
+/// Set in the processes that only print their picture's hash.
+const CHILD: &str = "CLERESTORY_TEST_PRINT_EVENTS_HASH";
+const CHILD_TEST: &str = "volume::prints_its_hash_when_asked";
+
+/// A medium of extinction σ and albedo c.
+fn medium(sigma_t: f32, albedo: f32, phase: Phase) -> Medium {
+    Medium {
+        name: "medium".into(),
+        sigma_a: Vec3::splat(sigma_t * (1.0 - albedo)),
+        sigma_s: Vec3::splat(sigma_t * albedo),
+        phase,
+        ..Medium::default()
+    }
+}
+
+/// A point light of 1 W in an endless medium, with a black floor too far away for its light.
+fn endless(medium: Medium) -> Scene {
+    let mut scene = Scene {
+        name: "endless medium".into(),
+        ..Scene::default()
+    };
+    let black = scene.add_material(Material::lambert("black", Vec3::ZERO));
+    scene.place(floor("floor", black, 0.01, -100.0));
+    scene.media.push(medium);
+    scene.surrounding = Some(0);
+    scene.cameras.push(camera_down(1.0, 2.0));
+    add_point(&mut scene, Vec3::ZERO, Vec3::ONE);
+    scene
+}
+
+/// A black floor and a light beside a box of a medium behind an invisible boundary, seen from above through the box.
+fn lit_box(medium: Medium) -> Scene {
+    let mut scene = Scene {
+        name: "lit box".into(),
+        ..Scene::default()
+    };
+    let grey = scene.add_material(Material::lambert("grey", Vec3::new(0.6, 0.5, 0.4)));
+    scene.place(floor("floor", grey, 1.5, -0.6));
+    scene.media.push(medium);
+    let boundary = scene.add_material(Material {
+        name: "boundary".into(),
+        boundary: true,
+        interior: Some(0),
+        ..Material::default()
+    });
+    scene.place(cuboid("box", boundary, Vec3::splat(-0.5), Vec3::splat(0.5)));
+    scene.cameras.push(camera_down(0.4, 5.0));
+    add_point(&mut scene, Vec3::new(0.9, 0.8, 0.2), Vec3::splat(20.0));
+    scene
+}
+
+/// A density that changes across the box, up to twice the mean.
+fn uneven(mut medium: Medium) -> Medium {
+    let density = |p: DVec3| (2.0 * p.x * (0.5 + 0.5 * (7.0 * p.y).sin()) + 0.3 * p.z) as f32;
+    let grid = DensityGrid::from_fn([8, 12, 6], density);
+    medium.density = Some(grid.in_box(DVec3::splat(-0.5), DVec3::splat(0.5)));
+    medium
+}
+
+fn all_events(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, pass: u32) -> (Vec<MappedEvent>, MapperCounts) {
+    let mut mapper = mapper(gpu, scene, settings);
+    let events = mapper.events(pass).unwrap_or_else(|error| panic!("{error}"));
+    (events, mapper.counts())
+}
+
+fn direct(photons: u32) -> PhotonSettings {
+    PhotonSettings {
+        photons,
+        direct_photons: true,
+        ..settings("all")
+    }
+}
+
+#[test]
+fn photons_in_media_are_kept_to_the_count() {
+    with_gpu(|gpu| {
+        let glass = builtin("builtin:fog-box?sphere=glass");
+        let absorbing = medium(2.0, 0.0, Phase::Isotropic);
+        for (scene, scatters) in [
+            (glass, true),
+            (lit_box(medium(3.0, 0.8, Phase::Isotropic)), true),
+            (
+                lit_box(uneven(medium(5.0, 1.0, Phase::HenyeyGreenstein { g: 0.7 }))),
+                true,
+            ),
+            (lit_box(absorbing), false),
+        ] {
+            let (events, counts) = all_events(gpu, &scene, &direct(1 << 12), 0);
+            let c = counts.photons;
+            assert_eq!(
+                (c.emitted, c.escaped + c.absorbed),
+                (1 << 12, 1 << 12),
+                "{}",
+                scene.name
+            );
+            assert_eq!(
+                (c.events, events.len() as u64),
+                (c.collisions, c.collisions),
+                "{}",
+                scene.name
+            );
+            assert_eq!(c.collisions > 500, scatters, "{}: {c:?}", scene.name);
+            let of_first: Vec<_> = events.iter().take_while(|e| e.event.bounce == 0).collect();
+            assert!(of_first.len() <= 1 << 12 && (!scatters || !of_first.is_empty()));
+        }
+    });
+}
+
+#[test]
+fn collisions_are_as_many_as_the_albedo_says() {
+    with_gpu(|gpu| {
+        for (albedo, phase) in [(0.5, Phase::Isotropic), (0.9, Phase::Schlick { k: 0.6 })] {
+            let scene = endless(medium(1.5, albedo, phase));
+            let photons = 1 << 14;
+            let (events, counts) = all_events(gpu, &scene, &direct(photons), 0);
+            let (n, a) = (f64::from(photons), f64::from(albedo));
+            // Photons end at collisions alone, with the probability 1 − α each: numbers are geometric.
+            let mean = counts.photons.collisions as f64 / n;
+            expect_mean("collisions", mean, a / (1.0 - a).powi(2) / n, 1.0 / (1.0 - a), 0.0);
+            // What collisions scatter: α of the first, α of what is left at each further one.
+            for order in 0..4 {
+                let of_order = events.iter().filter(|e| e.event.bounce == order);
+                let (sum, squares) = of_order.fold((0.0, 0.0), |(sum, squares), e| {
+                    let flux = f64::from(e.event.flux.x);
+                    (sum + flux, squares + flux * flux)
+                });
+                let variance = squares - sum * sum / n;
+                // All of an order have one flux, which dithering keeps from erring alike.
+                expect_mean(
+                    "scattered",
+                    sum,
+                    variance.max(n.powi(-2)),
+                    a.powi(order as i32 + 1),
+                    0.0,
+                );
+            }
+            // Distances of the first collisions have the mean free path, and the variance of its square.
+            let first = events.iter().filter(|e| e.event.bounce == 0);
+            let distances: Vec<f64> = first.map(|e| f64::from(e.event.position.length())).collect();
+            assert_eq!(distances.len(), photons as usize);
+            let mean = distances.iter().sum::<f64>() / n;
+            expect_mean("free path", mean, 1.5f64.powi(-2) / n, 1.0 / 1.5, 0.0);
+        }
+    });
+}
+
+/// The ray along z from the origin to a black wall at 4 m, in an endless medium, with a light of 1 W/sr at (1, 0, z); lengths are multiplied.
+fn airlight(k: f32, z: f32, lengths: f32) -> Scene {
+    let mut scene = Scene {
+        name: format!("airlight, k {k}, z {z}"),
+        ..Scene::default()
+    };
+    let black = scene.add_material(Material::lambert("black", Vec3::ZERO));
+    let corner = |x: f32, y: f32| Vec3::new(4.0 * x, 4.0 * y, 4.0) * lengths;
+    scene.place(Mesh {
+        name: "wall".into(),
+        positions: vec![
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        material: Some(black),
+        ..Mesh::default()
+    });
+    scene.media.push(Medium {
+        name: "fog".into(),
+        sigma_a: Vec3::splat(0.05 / lengths),
+        sigma_s: Vec3::splat(0.1 / lengths),
+        phase: Phase::Schlick { k },
+        ..Medium::default()
+    });
+    scene.surrounding = Some(0);
+    let mut camera = Camera::look_at("ray", DVec3::ZERO, DVec3::Z, DVec3::Y, 1.0);
+    camera.projection = Projection::Orthographic {
+        half_height: 1e-6 * lengths,
+    };
+    scene.cameras.push(camera);
+    let power = Vec3::splat((4.0 * PI) as f32);
+    add_point(&mut scene, Vec3::new(1.0, 0.0, z) * lengths, power);
+    scene
+}
+
+/// Single scattering from photons alone.
+fn single(volume: VolumeEstimate, radius: f32) -> PhotonSettings {
+    PhotonSettings {
+        photons: 1 << 15,
+        direct_photons: true,
+        volume,
+        volume_radius: radius,
+        ..settings("bounces=1..1")
+    }
+}
+
+#[test]
+fn airlight_has_its_six_constants() {
+    with_gpu(|gpu| {
+        for (k, z, expected) in [
+            (0.0, 2.0, 0.0108397),
+            (0.5, 2.0, 0.0113180),
+            (-0.5, 2.0, 0.0097508),
+            (0.0, 0.0, 0.0072893),
+            (0.5, 0.0, 0.0035960),
+            (-0.5, 0.0, 0.0111230),
+        ] {
+            let scene = airlight(k, z, 1.0);
+            let found = means(gpu, &scene, &single(VolumeEstimate::Ray, 0.2), 8);
+            assert!(found.counts.beams.photons > 0);
+            let expected = Mean {
+                value: expected,
+                variance: 0.0,
+            };
+            // The blur of kernels of 0.1 m adds 0.22 %, and grows with the square of the radius.
+            found.expect(&scene.name, 0, 0, expected, 1e-2);
+            let mirrored = Mean {
+                value: 0.0111230,
+                variance: 0.0,
+            };
+            if (k, z) == (0.5, 0.0) {
+                let mean = found.parts[0][0];
+                assert!(
+                    (mean.value - mirrored.value).abs() > 20.0 * mean.variance.sqrt(),
+                    "mirrored"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn beams_have_the_six_constants() {
+    with_gpu(|gpu| {
+        for (k, z, expected) in [
+            (0.0, 2.0, 0.0108397),
+            (0.5, 2.0, 0.0113180),
+            (-0.5, 2.0, 0.0097508),
+            (0.0, 0.0, 0.0072893),
+            (0.5, 0.0, 0.0035960),
+            (-0.5, 0.0, 0.0111230),
+        ] {
+            let scene = airlight(k, z, 1.0);
+            let settings = PhotonSettings {
+                photons: 1 << 12,
+                ..single(VolumeEstimate::Beams, 0.05)
+            };
+            let expected = Mean {
+                value: expected,
+                variance: 0.0,
+            };
+            // An eighth of the photons of the beam estimate's test; the blur is that of narrower kernels.
+            means(gpu, &scene, &settings, 8).expect(&scene.name, 0, 0, expected, 3e-3);
+        }
+    });
+}
+
+#[test]
+fn lengths_times_eight_give_a_sixty_fourth() {
+    with_gpu(|gpu| {
+        for volume in [VolumeEstimate::Ray, VolumeEstimate::March, VolumeEstimate::Beams] {
+            let of = |lengths: f32| {
+                let settings = PhotonSettings {
+                    photons: 1 << 13,
+                    ..single(volume, 0.25 * lengths)
+                };
+                photons(gpu, &airlight(0.5, 2.0, lengths), &settings, 2)
+            };
+            let (truth, scaled) = (of(1.0), of(8.0));
+            assert!(truth[0] > 1e-3, "{}", truth[0]);
+            let back: Vec<f32> = scaled.iter().map(|value| value * 64.0).collect();
+            assert_eq!(bits(&back), bits(&truth), "{volume:?}");
+        }
+    });
+}
+
+#[test]
+fn fog_agrees_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let scene = lit_box(medium(2.0, 0.8, Phase::HenyeyGreenstein { g: 0.5 }));
+        let reference = traced(gpu, &scene, "bounces=2..4", 1024);
+        for volume in [VolumeEstimate::Ray, VolumeEstimate::March, VolumeEstimate::Beams] {
+            let settings = PhotonSettings {
+                volume,
+                volume_radius: 0.02,
+                radius: 0.1,
+                photons: 1 << 14,
+                ..settings("bounces=2..4")
+            };
+            let found = means(gpu, &scene, &settings, 16);
+            // Events lack beyond the boundaries that rays cross, on a way of about half a radius of the metre's.
+            found.expect_same_as(&format!("{volume:?}"), &reference, [1.5e-2; 3]);
+            assert!(found.counts.beams.photons > 1000);
+        }
+    });
+}
+
+#[test]
+fn glass_in_fog_agrees_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let scene = builtin("builtin:fog-box?sphere=glass&sigma_s=3");
+        let set = "bounces=2..5";
+        let settings = PhotonSettings {
+            volume_radius: 0.008,
+            radius: 0.01,
+            photons: 1 << 15,
+            ..settings(set)
+        };
+        expect_agreement(gpu, &scene, &settings, [16, 1024], [4e-2; 3]);
+    });
+}
+
+#[test]
+fn grids_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let coloured = Medium {
+            sigma_s: Vec3::new(1.0, 2.0, 4.0),
+            sigma_a: Vec3::new(0.5, 0.2, 0.1),
+            ..Medium::default()
+        };
+        let scene = lit_box(uneven(coloured));
+        let settings = PhotonSettings {
+            volume_radius: 0.02,
+            radius: 0.1,
+            photons: 1 << 14,
+            ..settings("bounces=2..4")
+        };
+        // As in fog; besides, density within a kernel is that of its middle.
+        expect_agreement(gpu, &scene, &settings, [16, 1024], [2e-2; 3]);
+    });
+}
+
+#[test]
+fn kernels_from_footprints_hold_as_many_collisions_as_they_should() {
+    with_gpu(|gpu| {
+        let scene = endless(medium(1.0, 0.5, Phase::Isotropic));
+        let settings = PhotonSettings {
+            volume_kernel: VolumeKernel::Footprint,
+            volume_dampening: 0.0,
+            volume_radius: 1e3,
+            ..direct(1 << 14)
+        };
+        let (events, _) = all_events(gpu, &scene, &settings, 0);
+        let first: Vec<_> = events.iter().map(|e| e.event).filter(|e| e.bounce == 0).collect();
+        // The radius is three times the cube root of the volume that a collision has: 4π r² e^r / n at a distance of r.
+        for event in first.iter().step_by(97) {
+            let r = f64::from(event.position.length());
+            let volume = 4.0 * PI * r * r * r.exp() / 16_384.0;
+            let ratio = f64::from(event.radius) / (3.0 * volume.cbrt());
+            // Directions and lengths in f32.
+            assert!((ratio - 1.0).abs() < 1e-4, "{r}: {ratio}");
+        }
+        // In such a ball lie 4π/3 · 27 = 113 of them, where their density is even; about a mean free path from the light it is within a tenth.
+        let near: Vec<_> = first
+            .iter()
+            .filter(|e| (0.7..1.3).contains(&e.position.length()))
+            .collect();
+        let inside = |e: &PhotonEvent| {
+            let within = |other: &PhotonEvent| other.position.distance(e.position) < e.radius;
+            first.iter().filter(|other| within(other)).count() as f64
+        };
+        let counts: Vec<f64> = near.iter().step_by(16).map(|e| inside(e)).collect();
+        let mean = counts.iter().sum::<f64>() / counts.len() as f64;
+        println!("collisions in the ball: {mean:.1}, of even ones 113.1");
+        assert!((mean / 113.1 - 1.0).abs() < 0.1, "{mean}");
+        // Further collisions have wider kernels, by the distance from which they were scattered anew.
+        assert!(
+            events
+                .iter()
+                .all(|e| e.event.radius > 0.0 && e.event.radius.is_finite())
+        );
+    });
+}
+
+#[test]
+fn kernels_from_footprints_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let fog = lit_box(medium(2.0, 0.8, Phase::HenyeyGreenstein { g: 0.5 }));
+        let grid = lit_box(uneven(medium(2.0, 0.8, Phase::Isotropic)));
+        for (scene, shape) in [(fog, KernelShape::Isotropic), (grid, KernelShape::Fixed)] {
+            let settings = PhotonSettings {
+                shape,
+                volume_kernel: VolumeKernel::Footprint,
+                volume_spread: 1.5,
+                volume_radius: 0.03,
+                radius: 0.1,
+                photons: 1 << 14,
+                ..settings("bounces=2..4")
+            };
+            expect_agreement(gpu, &scene, &settings, [16, 1024], [3e-2; 3]);
+        }
+    });
+}
+
+#[test]
+fn expressions_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        // A wall of glass between the light and the fog.
+        let mut scene = lit_box(medium(2.0, 0.8, Phase::Isotropic));
+        let glass = scene.add_material(Material::glass("pane", 1.5));
+        scene.place(cuboid(
+            "pane",
+            glass,
+            Vec3::new(0.6, -0.5, -0.6),
+            Vec3::new(0.7, 1.2, 0.8),
+        ));
+        scene.lights.clear();
+        let shining = scene.add_material(clerestory_tests::render::lamp(Vec3::splat(8.0)));
+        scene.place(cuboid(
+            "lamp",
+            shining,
+            Vec3::new(0.9, 0.2, -0.3),
+            Vec3::new(1.1, 0.6, 0.3),
+        ));
+        for set in ["LS+VE", "L.*V.*E", "LS+DE"] {
+            let settings = PhotonSettings {
+                volume_radius: 0.02,
+                radius: 0.05,
+                photons: 1 << 14,
+                ..settings(set)
+            };
+            let found = expect_agreement(gpu, &scene, &settings, [16, 2048], [2.5e-2; 3]);
+            assert!(found.gather.photons + found.beams.photons > 1000, "{set}");
+        }
+    });
+}
+
+#[test]
+fn direct_photons_and_final_gather_have_the_same_light_in_media() {
+    with_gpu(|gpu| {
+        let scene = lit_box(medium(2.0, 0.8, Phase::Isotropic));
+        let reference = traced(gpu, &scene, "bounces=1..3", 1024);
+        for (direct_photons, final_gather) in [(true, false), (false, true)] {
+            let settings = PhotonSettings {
+                direct_photons,
+                final_gather,
+                volume_radius: 0.02,
+                radius: 0.05,
+                photons: 1 << 14,
+                ..settings("bounces=1..3")
+            };
+            let what = format!("direct {direct_photons}, final gather {final_gather}");
+            means(gpu, &scene, &settings, 16).expect_same_as(&what, &reference, [2e-2; 3]);
+        }
+    });
+}
+
+#[test]
+fn kernels_shrink_as_the_theory_says() {
+    with_gpu(|gpu| {
+        let scene = airlight(0.0, 2.0, 1.0);
+        for (volume, exponent) in [
+            (VolumeEstimate::Beams, 1.0),
+            (VolumeEstimate::Ray, 2.0),
+            (VolumeEstimate::March, 3.0),
+        ] {
+            let settings = PhotonSettings {
+                reduction: 2.0 / 3.0,
+                ..single(volume, 0.5)
+            };
+            let mapper = mapper(gpu, &scene, &settings);
+            assert_eq!(mapper.event_radius(0), 0.5);
+            for pass in 1..20 {
+                // Width of beams, area of disks, volume of balls: (i + α)/(i + 1) of those before.
+                let ratio = (mapper.event_radius(pass) / mapper.event_radius(pass - 1)).powf(exponent);
+                let expected = (f64::from(pass) + 2.0 / 3.0) / (f64::from(pass) + 1.0);
+                assert!(
+                    (ratio / expected - 1.0).abs() < 1e-6,
+                    "{volume:?} {pass}: {ratio} {expected}"
+                );
+            }
+        }
+        // Without a radius of its own a fiftieth of the diagonal.
+        let settings = single(VolumeEstimate::Ray, 0.0);
+        let diagonal = 128f64.sqrt();
+        assert!((mapper(gpu, &scene, &settings).event_radius(0) * 50.0 / diagonal - 1.0).abs() < 1e-5);
+    });
+}
+
+#[test]
+fn hosts_and_devices_build_the_same_maps_of_media() {
+    with_gpu(|gpu| {
+        let scene = lit_box(medium(4.0, 0.9, Phase::Isotropic));
+        for volume in [VolumeEstimate::Ray, VolumeEstimate::Beams] {
+            let of = |map_build| {
+                let settings = PhotonSettings {
+                    map_build,
+                    volume,
+                    photons: 1 << 12,
+                    ..settings("all")
+                };
+                photons(gpu, &scene, &settings, 2)
+            };
+            assert_eq!(bits(&of(MapBuild::Host)), bits(&of(MapBuild::Device)), "{volume:?}");
+        }
+    });
+}
+
+#[test]
+fn beams_that_a_quota_stops_go_through_all_records() {
+    with_gpu(|gpu| {
+        let scene = lit_box(uneven(medium(4.0, 0.9, Phase::Isotropic)));
+        let of = |query_quota, volume| {
+            let settings = PhotonSettings {
+                query_quota,
+                volume,
+                photons: 1 << 11,
+                volume_radius: 0.05,
+                ..settings("all")
+            };
+            let mut mapper = mapper(gpu, &scene, &settings);
+            let picture = advance(&mut mapper, 2);
+            (picture, mapper.counts(), mapper.eye_counters().stalls)
+        };
+        for volume in [VolumeEstimate::Ray, VolumeEstimate::March] {
+            let (whole, counts, stalls) = of(32_768, volume);
+            assert_eq!(stalls, 0);
+            let (stopped, stopped_counts, stalls) = of(64, volume);
+            assert!(stalls > 0);
+            assert_eq!(
+                (stopped_counts.beams, stopped_counts.gather),
+                (counts.beams, counts.gather)
+            );
+            assert!(counts.beams.queries > 0 && counts.gather.queries > 0);
+            // Sums of some hundred kernels in another order.
+            for (i, (a, b)) in whole.iter().zip(&stopped).enumerate() {
+                assert!((a - b).abs() <= 1e-5 * a, "{volume:?} {i}: {b}, not {a}");
+            }
+        }
+    });
+}
+
+#[test]
+fn room_for_events_grows() {
+    with_gpu(|gpu| {
+        // Nine collisions a photon are stored, of which four have room at first.
+        let scene = endless(medium(1.0, 0.9, Phase::Isotropic));
+        let (events, counts) = all_events(gpu, &scene, &direct(1 << 12), 0);
+        assert!(events.len() > 8 << 12 && counts.photons.emitted == 1 << 12);
+        // The order of bounces and photons: with room for all from the start it is the same.
+        let mut twice = mapper(gpu, &scene, &direct(1 << 12));
+        let first = twice.events(0).unwrap_or_else(|error| panic!("{error}"));
+        let second = twice.events(0).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(first, second);
+        assert_eq!(first, events);
+    });
+}
+
+#[test]
+fn scenes_without_media_have_nothing_of_it() {
+    with_gpu(|gpu| {
+        let names = |scene: &Scene| -> Vec<&str> {
+            let mapper = mapper(gpu, scene, &settings("all"));
+            mapper.pipelines().iter().map(|pipeline| pipeline.shader).collect()
+        };
+        let of_media = ["photon_medium", "photon_volume", "photon_beam", "photon_event"];
+        let has = |names: &[&str], word: &str| names.iter().any(|name| name.contains(word));
+        let box_of_walls = names(&builtin("builtin:cornell-box"));
+        assert!(has(&box_of_walls, "photon_append"));
+        assert!(
+            !of_media.iter().any(|word| has(&box_of_walls, word)),
+            "{box_of_walls:?}"
+        );
+        let fog = names(&builtin("builtin:fog-box"));
+        assert!(of_media.iter().all(|word| has(&fog, word)), "{fog:?}");
+        assert!(!has(&fog, "photon_append"));
+        let (events, counts) = all_events(gpu, &builtin("builtin:cornell-box"), &direct(1 << 10), 0);
+        assert!(events.is_empty() && counts.photons.events == 0 && counts.photons.collisions == 0);
+    });
+}
+
+#[test]
+fn what_photons_cannot_bring_through_media_is_refused() {
+    with_gpu(|gpu| {
+        let refuse = |scene: &Scene, settings: PhotonSettings| {
+            let made = PhotonMapper::new(gpu, upload(gpu, scene), &scene.cameras[0], SIZE, settings);
+            match made {
+                Ok(_) => panic!("{} was accepted", scene.name),
+                Err(error) => error,
+            }
+        };
+        let mut glowing = lit_box(medium(1.0, 0.5, Phase::Isotropic));
+        glowing.media[0].emission = Vec3::ONE;
+        let error = refuse(&glowing, settings("all"));
+        assert!(error.to_string().contains("emit light"), "{error}");
+        let beams = PhotonSettings {
+            volume: VolumeEstimate::Beams,
+            ..settings("all")
+        };
+        match refuse(&lit_box(uneven(medium(1.0, 0.5, Phase::Isotropic))), beams) {
+            Error::Setting { name, .. } => assert_eq!(name, "volume"),
+            other => panic!("{other}"),
+        }
+        let mut sky = endless(medium(1.0, 0.5, Phase::Isotropic));
+        sky.environment = Some(Environment::uniform(Vec3::ONE));
+        let error = refuse(&sky, settings("all"));
+        assert!(error.to_string().contains("light from infinity"), "{error}");
+        match refuse(
+            &endless(medium(1.0, 0.5, Phase::Isotropic)),
+            single(VolumeEstimate::Ray, f32::NAN),
+        ) {
+            Error::Setting { name, .. } => assert_eq!(name, "volume_radius"),
+            other => panic!("{other}"),
+        }
+    });
+}
+
+fn hashed_picture(gpu: &Gpu) -> Vec<f32> {
+    let coloured = Medium {
+        sigma_s: Vec3::new(1.0, 2.0, 4.0),
+        sigma_a: Vec3::new(0.5, 0.2, 0.1),
+        ..Medium::default()
+    };
+    let settings = PhotonSettings {
+        photons: 1 << 12,
+        ..settings("all")
+    };
+    let mut all = photons(gpu, &lit_box(uneven(coloured.clone())), &settings, 2);
+    all.extend(photons(gpu, &lit_box(coloured.clone()), &settings, 2));
+    let beams = PhotonSettings {
+        volume: VolumeEstimate::Beams,
+        ..settings
+    };
+    all.extend(photons(gpu, &lit_box(coloured), &beams, 2));
+    all
+}
+
+#[test]
+fn threads_never_show_in_media() {
+    let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
+    let truth = hash(&[("LP_NUM_THREADS", "1"), ("RAYON_NUM_THREADS", "1")]);
+    assert_eq!(hash(&[("LP_NUM_THREADS", "2")]), truth, "two threads");
+}
+
+#[test]
+fn prints_its_hash_when_asked() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    let gpu = gpu();
+    let hash = bits(&hashed_picture(&gpu))
+        .iter()
+        .flat_map(|word| word.to_le_bytes())
+        .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+    println!("hash {hash:016x}");
+    clerestory_tests::assert_no_messages(&gpu);
+}
+
+#[test]
+fn errors_fall_with_passes() {
+    with_gpu(|gpu| {
+        // Kernels so wide that their blur is far above the noise: it falls as the mean of their squares does.
+        let scene = airlight(0.0, 2.0, 1.0);
+        const PASSES: u32 = 12;
+        let [shrinking, constant] = [2.0 / 3.0, 1.0].map(|reduction| {
+            let settings = PhotonSettings {
+                photons: 1 << 13,
+                reduction,
+                ..single(VolumeEstimate::Ray, 1.0)
+            };
+            let mut mapper = mapper(gpu, &scene, &settings);
+            let blur: f64 = (0..PASSES).map(|pass| mapper.event_radius(pass).powi(2)).sum();
+            let error = f64::from(advance(&mut mapper, PASSES)[0]) / 0.0108397 - 1.0;
+            (error, blur / f64::from(PASSES))
+        });
+        println!(
+            "errors {:.4} and {:.4}, blur {:.4}",
+            shrinking.0, constant.0, shrinking.1
+        );
+        assert!(constant.0.abs() > 0.1, "{constant:?}");
+        // The same photons: what differs is the kernels'.
+        let (ratio, expected) = (shrinking.0 / constant.0, shrinking.1 / constant.1);
+        assert!((ratio / expected - 1.0).abs() < 0.2, "{ratio} {expected}");
+    });
+}
+
+#[test]
+fn scattered_flux_of_coloured_media_is_that_of_each_band() {
+    with_gpu(|gpu| {
+        let coloured = Medium {
+            sigma_s: Vec3::new(1.0, 0.4, 2.0),
+            sigma_a: Vec3::new(0.5, 0.6, 0.0),
+            ..Medium::default()
+        };
+        let scene = endless(coloured);
+        let mut mapper = mapper(gpu, &scene, &direct(1 << 12));
+        // Bands share a walk, whose weights make up for it: each band's first collisions scatter its own albedo.
+        let passes: Vec<[f64; 3]> = (0..12)
+            .map(|pass| {
+                let events = mapper.events(pass).unwrap_or_else(|error| panic!("{error}"));
+                let first = events.iter().filter(|e| e.event.bounce == 0);
+                first.fold([0.0; 3], |sum, e| {
+                    std::array::from_fn(|band| sum[band] + f64::from(e.event.flux[band]))
+                })
+            })
+            .collect();
+        for (band, albedo) in [1.0 / 1.5, 0.4, 1.0].into_iter().enumerate() {
+            let values: Vec<f64> = passes.iter().map(|sums| sums[band]).collect();
+            expect_mean_of(&format!("band {band}"), &values, albedo, 0.0, 0.0);
+        }
+    });
+}
