@@ -11,9 +11,9 @@
 #define CLERESTORY_TRANSPORT_ENVIRONMENT_GLSL
 
 #include "transport/distribution.glsl"
+#include "transport/luminance.glsl"
 #include "transport/warp.glsl"
 
-const vec4 LUMINANCE = vec4(0.2126, 0.7152, 0.0722, 0.0);
 // What corners are taken to have at least, so that densities in a cell are quotients of normal numbers: 2^-80.
 const float ENVIRONMENT_LUMINANCE_MIN = 8.271806e-25;
 

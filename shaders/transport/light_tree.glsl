@@ -6,12 +6,17 @@
 // Guarantees: at every node each child has a probability that is a positive multiple of 2^-24, exactly the share of words that choose it, so
 // that no light is lost to rounding; at most LIGHT_TREE_DEPTH_MAX steps.
 // Expects, declared before the inclusion: `SceneLightNode load_light_node(uint index)`, `uint load_light_trail(uint light)`, and what
-// distribution.glsl expects.
+// distribution.glsl expects. Of another tree than the scene's: CLERESTORY_LIGHT_NODE, the name of the function that loads its nodes, and
+// CLERESTORY_LIGHT_GEOMETRY_MOST, the greatest geometry term that its lights are taken to have, 1/m2.
 #ifndef CLERESTORY_TRANSPORT_LIGHT_TREE_GLSL
 #define CLERESTORY_TRANSPORT_LIGHT_TREE_GLSL
 
 #include "scene/records.glsl"
 #include "transport/distribution.glsl"
+
+#ifndef CLERESTORY_LIGHT_NODE
+#define CLERESTORY_LIGHT_NODE load_light_node
+#endif
 
 // Least cosine of a bound: more than what rounding makes of a light just above a horizon, so that no light is without importance. 2^-20.
 const float LIGHT_COS_MIN = 9.5367432e-7;
@@ -50,6 +55,9 @@ float light_node_importance(SceneLightNode n, vec3 from, vec3 normal) {
             importance *= max(cosine_bound(dot(normal, to) + dot(abs(normal), n.half_extent), least, greatest), LIGHT_COS_MIN);
         }
     }
+#ifdef CLERESTORY_LIGHT_GEOMETRY_MOST
+    importance = min(importance, n.strength * CLERESTORY_LIGHT_GEOMETRY_MOST);
+#endif
     return importance;
 }
 
@@ -64,15 +72,13 @@ float light_node_share(SceneLightNode first, SceneLightNode second, float share,
     return clamp(floor(p * DISTRIBUTION_QUANTA + 0.5), 1.0, DISTRIBUTION_QUANTA - 1.0) / DISTRIBUTION_QUANTA;
 }
 
-// The light that a word chooses for a point. The word becomes its place within that light's share.
-uint light_tree_sample(vec3 from, vec3 normal, inout uint word, uint fresh, out float probability) {
-    SceneLightNode root = load_light_node(0u);
-    uint child = root.child;
-    float share = root.share;
+// The light below a node, whose first child and fixed share these are, that a word chooses for a point. The word becomes its place within that
+// light's share.
+uint light_tree_descend(uint child, float share, vec3 from, vec3 normal, inout uint word, uint fresh, out float probability) {
     probability = 1.0;
     for (uint depth = 0u; depth < LIGHT_TREE_DEPTH_MAX && (child & LIGHT_NODE_LEAF) == 0u; ++depth) {
-        SceneLightNode first = load_light_node(child);
-        SceneLightNode second = load_light_node(child + 1u);
+        SceneLightNode first = CLERESTORY_LIGHT_NODE(child);
+        SceneLightNode second = CLERESTORY_LIGHT_NODE(child + 1u);
         float p = light_node_share(first, second, share, from, normal);
         bool goes_first = unit_float(word) < p;
         float chosen = goes_first ? p : 1.0 - p;
@@ -86,19 +92,25 @@ uint light_tree_sample(vec3 from, vec3 normal, inout uint word, uint fresh, out 
     return child & ~LIGHT_NODE_LEAF;
 }
 
+// The light that a word chooses for a point. The word becomes its place within that light's share.
+uint light_tree_sample(vec3 from, vec3 normal, inout uint word, uint fresh, out float probability) {
+    SceneLightNode root = CLERESTORY_LIGHT_NODE(0u);
+    return light_tree_descend(root.child, root.share, from, normal, word, fresh, probability);
+}
+
 // Probability with which light_tree_sample chooses a light for a point, by the way to it; 0 for lights that are not in the tree.
 float light_tree_probability(uint light, vec3 from, vec3 normal) {
     uint trail = load_light_trail(light);
     if (trail == LIGHT_TRAIL_NONE) {
         return 0.0;
     }
-    SceneLightNode root = load_light_node(0u);
+    SceneLightNode root = CLERESTORY_LIGHT_NODE(0u);
     uint child = root.child;
     float share = root.share;
     float probability = 1.0;
     for (uint depth = 0u; depth < LIGHT_TREE_DEPTH_MAX && (child & LIGHT_NODE_LEAF) == 0u; ++depth) {
-        SceneLightNode first = load_light_node(child);
-        SceneLightNode second = load_light_node(child + 1u);
+        SceneLightNode first = CLERESTORY_LIGHT_NODE(child);
+        SceneLightNode second = CLERESTORY_LIGHT_NODE(child + 1u);
         float p = light_node_share(first, second, share, from, normal);
         bool goes_first = (trail >> depth & 1u) == 0u;
         probability *= goes_first ? p : 1.0 - p;

@@ -31,10 +31,58 @@ uint load_light_trail(uint light) {
     return trail < 0.0 ? LIGHT_TRAIL_NONE : uint(trail);
 }
 
-#include "transport/light_tree.glsl"
+// A bound where cuts are compared, else none.
+#define CLERESTORY_LIGHT_GEOMETRY_MOST (push.function == 2u ? in1(12u) : 3.402823e38)
+
+#include "techniques/instant_radiosity/potential_bins.glsl"
+#include "transport/light_cut.glsl"
+#include "transport/light_node.glsl"
+
+// Unions of cones and nodes, and bins of potentials.
+void unions() {
+    LightCone both = cone_union(LightCone(in3(0u), in1(3u), in1(4u)), LightCone(in3(5u), in1(8u), in1(9u)));
+    out3(0u, both.axis);
+    out1(3u, both.spread);
+    out1(4u, both.reach);
+    out_bits(5u, potential_bin(in1(10u)));
+    out1(6u, potential_bin_least(in_bits(11u)));
+    SceneLightNode node = light_node_union(load_light_node(in_bits(12u)), load_light_node(in_bits(13u)));
+    out3(7u, node.center);
+    out3(10u, node.half_extent);
+    out1(13u, node.strength);
+    out1(14u, node.radius);
+    out1(15u, node.cos_spread);
+}
+
+// The cut of a point, and the light that a word chooses below one of its nodes.
+void cut() {
+    vec3 from = in3(0u);
+    vec3 normal = in3(3u);
+    uint count = light_cut(from, normal, in_bits(10u));
+    uint place = in_bits(11u) % count;
+    float probability;
+    out_bits(0u, count);
+    out_bits(1u, place);
+    out_bits(2u, light_cut_nodes[place]);
+    out_bits(3u, light_cut_sample(place, from, normal, in_word(6u), in_word(8u), probability));
+    out1(4u, probability);
+    uint sum = 0u;
+    for (uint i = 0u; i < count; ++i) {
+        sum += light_cut_nodes[i];
+    }
+    out_bits(5u, sum);
+}
 
 void main() {
     if (twin_case() >= push.case_count) {
+        return;
+    }
+    if (push.function == 1u) {
+        unions();
+        return;
+    }
+    if (push.function == 2u) {
+        cut();
         return;
     }
     vec3 from = in3(0u);

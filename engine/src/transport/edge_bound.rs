@@ -30,6 +30,15 @@ impl EdgeBound {
         }
     }
 
+    /// What the geometry term is at most, m⁻²: the greatest finite number where it is not bounded.
+    pub(crate) fn geometry_most(self) -> f32 {
+        match self {
+            Self::Unbounded => f32::MAX,
+            Self::Geometry(most) => most as f32,
+            Self::Distance(least) => ((1.0 / least) as f32).min(f32::MAX),
+        }
+    }
+
     /// What they are told.
     pub(crate) fn value(self) -> f32 {
         match self {

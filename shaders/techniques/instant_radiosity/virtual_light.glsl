@@ -10,8 +10,7 @@
 #define CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_VIRTUAL_LIGHT_GLSL
 
 #include "maps/octahedron.glsl"
-
-const uint VIRTUAL_LIGHT_QUARTERS = 4u;
+#include "techniques/instant_radiosity/light_record.glsl"
 
 // Where every surface scatters alike in all directions, on the side that light came from.
 const bool LAMBERT = !HAS_SPECULAR_LAYER && !HAS_METAL && !HAS_TRANSMISSION && !HAS_SHADING_NORMALS && !HAS_NORMAL_MAPS;

@@ -1,13 +1,17 @@
 #version 460
-// Radiance from all virtual lights of a pass where eye paths have arrived, at surfaces that scatter into more than one direction: the scattering functions at
-// both ends, the geometry term between them up to its bound, and a shadow ray.
+// Radiance from the virtual lights of a pass where eye paths have arrived, at surfaces that scatter into more than one direction: the scattering functions at
+// both ends, the geometry term between them up to its bound, and a shadow ray. From all lights; from those that carry a share of the sum of what all would bring
+// if nothing stood between; or from one below each node of a cut through a tree of them, over its probability.
 //
 // An invocation is for a place, and takes the lights in their order, so many a dispatch. A place that has not had all of them, or whose ray a quota stops,
 // notes where it is, marks itself and stalls the wave; further dispatches go on there. Places that are left for later, since the submission's work is used up,
-// stall the wave before they begin. Sums are kept between dispatches, so that they are the same bits however lights are shared out among them.
+// stall the wave before they begin. Sums are kept between dispatches, so that they are the same bits however lights are shared out among them; a cut
+// is made anew in each.
 //
 // SVO-G0, BG-8, BG-10, MET-V1: A. Keller, "Instant Radiosity", 1997; T. Kollig and A. Keller, "Illumination in the Presence of Weak Singularities", 2006.
-// Deterministic: a path's sum has the order of the lights.
+// MET-V4, MET-V7: a share of the potential. CL-VPL-CUTS: C. Yuksel, "Stochastic Lightcuts", 2019.
+// CL-VPL-RESAMPLED: J. Talbot et al., "Importance Resampling for Global Illumination", 2005.
+// Deterministic: a path's sum has the order of the lights, or of the cut's nodes.
 // variant: driver
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -18,98 +22,124 @@ layout(local_size_x = 64) in;
 #include "walk/wave.glsl"
 #include "transport/path_set.glsl"
 #include "wide_counter.glsl"
-
-layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
-layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // of a place, in a dispatch
-
-layout(push_constant, scalar) uniform Push {
-    vec3 scene_lower;
-    uint states;         // of a path whose rough surfaces gather, a bit each
-    vec3 scene_upper;
-    uint least_bounces;  // scatterings in all
-    uint most_bounces;
-    uint lights;
-    float scale;         // one over the walks of the pass
-    float edge_bound;    // of EDGE_BOUND
-    uint seed;           // of the pass
-    uint first_place;
-    uint goes_on;        // 1 for places that have stopped
-} push;
-
 #include "transport/random.glsl"
+#include "techniques/instant_radiosity/gather_place.glsl"
+#include "techniques/instant_radiosity/potential_bins.glsl"
+#include "transport/luminance.glsl"
 #include "walk/candidate_alpha.glsl"
 
 #define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
 #include "accel/index.glsl"
 
-// descriptor set 3: VirtualLightSet
+// Nodes that the invocation has looked at.
+uint light_nodes_read = 0u;
 
-layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
+SceneLightNode load_cut_node(uint index) {
+    ++light_nodes_read;
+    int first = int(LIGHT_NODE_QUARTERS * index);
+    vec4 q0 = uintBitsToFloat(texelFetch(light_node_texels, first));
+    vec4 q1 = uintBitsToFloat(texelFetch(light_node_texels, first + 1));
+    vec4 q2 = uintBitsToFloat(texelFetch(light_node_texels, first + 2));
+    uvec4 q3 = texelFetch(light_node_texels, first + 3);
+    return SceneLightNode(q0.xyz, q0.w, q1.xyz, q1.w, q2.xyz, q2.w, uintBitsToFloat(q3.x), uintBitsToFloat(q3.y), q3.z, q3.w);
+}
 
-#include "techniques/instant_radiosity/connection.glsl"
+#define CLERESTORY_LIGHT_NODE load_cut_node
+#define CLERESTORY_LIGHT_GEOMETRY_MOST push.geometry_most
+#include "transport/light_cut.glsl"
 
-layout(set = 3, binding = 1, scalar) restrict buffer VirtualLightStates { GatherState gather_states[]; };  // by place
-layout(set = 3, binding = 2, scalar) restrict buffer VirtualLightCounters {
-    uint gathers;          // places that gathered
-    uint remaining;        // places of a sweep that have not had all lights
-    uint connections[2];   // 64 bits, low word first: pairs of a place and a light
-    uint shadow_rays[2];   // those that might bring light
-} gather_counters;
-layout(set = 3, binding = 3, scalar) restrict readonly buffer LightDepartures { float departures[]; };  // path_departures, by slot
+// Of SELECT_POTENTIAL: what the lights of each bin carry.
+float carried_potentials[POTENTIAL_BINS];
 
 // Stand in walk_resume for a place that goes on in a later dispatch, and for one that has no light to gather or is done.
 const uint GATHER_STOPPED = 0xFFFFFFFEu;
 const uint GATHER_DONE = 0xFFFFFFFCu;
 // Tells the candidates of these rays from those of the paths' own.
 const uint GATHER_SEED = 0x76706c73u;
+// Tells what lights of a cut are chosen by.
+const uint CUT_SEED = 0x76706c63u;
 
-uint arriving_bounce(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce; }
-uint arriving_state(WalkState path) { return HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u; }
+// The normal that the choice of lights takes a receiver to have; zero where light comes from all sides.
+vec3 receiver_normal(Receiver r) { return HAS_TRANSMISSION && r.arrival.material.transmission > 0.0 ? vec3(0.0) : r.frame.z; }
 
-// Prepares the receiver of a place; false where nothing is gathered.
-bool begin_receiver(uint slot, uint place, out Receiver r) {
-    WalkState path = load_walk(slot);
-    Hit hit = load_hit(place);
-    r.bounce = arriving_bounce(path);
-    // A light and the receiver scatter once more each.
-    if ((push.states >> arriving_state(path) & 1u) == 0u || hit.triangle == NO_HIT || (COUNTS_BOUNCES && r.bounce + 2u > push.most_bounces)) {
-        return false;
-    }
-    r.arrival = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
-    if (arrival_is_unlit(r.arrival) || !arrival_has_rough_lobes(r.arrival)) {
-        return false;
-    }
-    r.interior = arrival_interior(r.arrival, HAS_TRANSMISSION ? walk_gathered[slot].interior : OUTSIDE);
-    r.throughput = absorbed(path.throughput, r.interior, hit.t);
-    if (EDGE_BOUND != EDGE_UNBOUNDED && path.pdf > 0.0) {
-        // The path has come over an edge of whose light virtual lights bring what its bound leaves.
-        float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
-        float cos_here = abs(dot(path.direction, r.arrival.surface.geometric_normal));
-        r.throughput *= 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, hit.t * hit.t);
-    }
-    r.frame = scattering_frame(r.arrival, arrival_normal(r.arrival));
-    return r.throughput != vec3(0.0);
+// Luminance of a potential contribution, W/(m2 sr) of a pass.
+float potential_key(vec3 found) { return dot(found, LUMINANCE.rgb) * push.scale; }
+
+// What a light brings if nothing stands between; nothing where the picture has not its number of scatterings.
+vec3 counted_connection(Receiver r, VirtualLight light, out Ray ray) {
+    vec3 found = connection(r, light, ray);
+    return counts_bounces(r.bounce + light.bounce + 2u) ? found : vec3(0.0);
 }
 
-// Whether the picture has what is scattered so often between a light source and the eye.
-bool counts_bounces(uint bounces) { return !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces); }
+// What a light below a node of the cut brings if nothing stands between, over the probability of its choice: of so many candidates one is kept by what they would
+// bring, and stands for them all.
+vec3 resampled_connection(Receiver r, uint place, vec3 normal, out Ray ray) {
+    vec3 kept = vec3(0.0);
+    float of_kept = 0.0;
+    float sum = 0.0;
+    for (uint candidate = 0u; candidate < push.candidates; ++candidate) {
+        uvec4 words = connection_words(r, candidate * LIGHT_CUT_MAX + place, CUT_SEED);
+        float probability;
+        uint number = light_cut_sample(place, r.arrival.surface.point.position, normal, words.x, words.y, probability);
+        Ray way;
+        vec3 found = counted_connection(r, load_virtual_light(number), way) / probability;
+        float weight = dot(found, LUMINANCE.rgb);
+        sum += weight;
+        if (unit_float(words.z) * sum < weight) {
+            kept = found;
+            of_kept = weight;
+            ray = way;
+        }
+    }
+    // Exactly itself where it is alone.
+    return kept * ((sum == of_kept ? 1.0 : sum / of_kept) / float(push.candidates));
+}
 
-// Goes on with the lights of a place.
-void gather(Receiver r, inout GatherState at, out uint rays) {
+// Finds the least potential that a place takes, so that its lights carry a share of the sum, and the rescaling that stands for the others.
+void select_by_potential(Receiver r, uint place) {
+    for (uint bin = 0u; bin < POTENTIAL_BINS; ++bin) {
+        carried_potentials[bin] = 0.0;
+    }
+    float total = 0.0;
+    for (uint number = 0u; number < push.lights; ++number) {
+        Ray ray;
+        float key = potential_key(counted_connection(r, load_virtual_light(number), ray));
+        carried_potentials[potential_bin(key)] += key;
+        total += key;
+    }
+    // From the strongest bin on.
+    float taken = 0.0;
+    uint bin = POTENTIAL_BINS;
+    for (uint step = 0u; step < POTENTIAL_BINS && (push.share >= 1.0 || taken < push.share * total); ++step) {
+        --bin;
+        taken += carried_potentials[bin];
+    }
+    uint words = push.first_selected + 2u * place;
+    selected_lights[words] = potential_bin_least(bin);
+    selected_lights[words + 1u] = push.rescales != 0u && bin > 0u && taken > 0.0 ? total / taken : 1.0;
+}
+
+// Goes on with the lights of a place, of which there are `count`, by the normal that they are chosen by, or the least potential of those that are taken.
+void gather(Receiver r, uint count, vec3 normal, float least, inout GatherState at, out uint rays) {
     rays = 0u;
-    uint last = min(at.light + LIGHTS_AT_ONCE, push.lights);
+    uint last = min(at.light + LIGHTS_AT_ONCE, count);
     bool stopped = false;
     do {
         Ray ray;
-        VirtualLight light = load_virtual_light(at.light);
-        vec3 found = connection(r, light, ray);
-        if (found != vec3(0.0) && counts_bounces(r.bounce + light.bounce + 2u)) {
+        vec3 found;
+        if (SELECTION == SELECT_CUTS) {
+            found = resampled_connection(r, at.light, normal, ray);
+        } else {
+            found = counted_connection(r, load_virtual_light(at.light), ray);
+        }
+        bool counts = found != vec3(0.0);
+        if (SELECTION == SELECT_POTENTIAL) {
+            counts = counts && potential_key(found) >= least;
+        }
+        if (counts) {
             rays += at.cursor == INDEX_START ? 1u : 0u;
             if (HAS_ALPHA) {
-                // The point and the way to it stand for the path, of which a stage between knows no number: under an orthographic camera ways are equal.
-                uvec3 place = floatBitsToUint(r.arrival.surface.point.position);
-                uvec3 way = floatBitsToUint(r.arrival.wo);
-                candidate_key = pcg4d(uvec4(place, push.seed)) + pcg4d(uvec4(way.x ^ at.light, way.y, way.z + r.bounce, GATHER_SEED));
+                candidate_key = connection_words(r, at.light, GATHER_SEED);
             }
             Hit hit = no_hit(ray.t_max);
             at.cursor = any_hit(ray, at.cursor, hit);
@@ -147,16 +177,35 @@ void main() {
     } else {
         atomicAdd(gather_counters.gathers, 1u);
     }
+    uint count = push.lights;
+    vec3 normal = receiver_normal(r);
+    float least = 0.0;
+    float rescaling = 1.0;
+    if (SELECTION == SELECT_CUTS) {
+        count = light_cut(r.arrival.surface.point.position, normal, push.cut_size);
+    }
+    if (SELECTION == SELECT_POTENTIAL) {
+        if (!goes_on) {
+            select_by_potential(r, place);
+        }
+        least = selected_lights[push.first_selected + 2u * place];
+        rescaling = selected_lights[push.first_selected + 2u * place + 1u];
+    }
     uint first = at.light;
     uint rays;
-    gather(r, at, rays);
-    COUNT_WIDE(gather_counters.connections, at.light - first)
+    gather(r, count, normal, least, at, rays);
+    uint candidates = SELECTION == SELECT_CUTS ? push.candidates : 1u;
+    COUNT_WIDE(gather_counters.connections, candidates * (at.light - first))
     COUNT_WIDE(gather_counters.shadow_rays, rays)
-    if (!goes_on) {
-        count_work(index_iterations + CONNECTION_ITERATIONS * LIGHTS_AT_ONCE, WORK_UNIT);
+    if (SELECTION == SELECT_CUTS) {
+        COUNT_WIDE(gather_counters.nodes, light_nodes_read)
     }
-    if (at.light == push.lights) {
-        walk_gathered[slot].radiance += r.throughput * at.sum * push.scale;
+    if (!goes_on) {
+        uint connections = candidates * LIGHTS_AT_ONCE + (SELECTION == SELECT_POTENTIAL ? push.lights : 0u);
+        count_work(index_iterations + CONNECTION_ITERATIONS * connections, WORK_UNIT);
+    }
+    if (at.light == count) {
+        walk_gathered[slot].radiance += r.throughput * at.sum * (push.scale * rescaling);
         return;
     }
     gather_states[place] = at;

@@ -9,6 +9,7 @@ mod bounds;
 mod edge_cases;
 mod many_light;
 mod scattering;
+mod selection;
 mod walks;
 
 use std::f64::consts::PI;

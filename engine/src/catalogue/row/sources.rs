@@ -111,6 +111,7 @@ sources! {
     LAMBERT_1760 = "lambert-1760": "J. H. Lambert", "Photometria", "", 1760;
     LAUTERBACH_2009 = "lauterbach-2009": "C. Lauterbach et al.", "Fast BVH Construction on GPUs", "Eurographics", 2009;
     LAZANYI_SZIRMAY_KALOS_2005 = "lazanyi-szirmay-kalos-2005": "I. Lazányi, L. Szirmay-Kalos", "Fresnel Term Approximations for Metals", "WSCG short papers", 2005;
+    LIN_YUKSEL_2020 = "lin-yuksel-2020": "D. Lin, C. Yuksel", "Real-Time Stochastic Lightcuts", "I3D", 2020;
     MEISTER_BITTNER_2018 = "meister-bittner-2018": "D. Meister, J. Bittner", "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", "CGF 37(2)", 2018;
     MEYER_2010 = "meyer-2010": "Q. Meyer et al.", "On Floating-Point Normal Vectors", "EGSR", 2010;
     MIKKELSEN_2008 = "mikkelsen-2008": "M. S. Mikkelsen", "Simulation of Wrinkled Surfaces Revisited", "Master's thesis, University of Copenhagen", 2008;
@@ -148,6 +149,7 @@ sources! {
     SZIRMAY_KALOS_2005 = "szirmay-kalos-2005": "L. Szirmay-Kalos, B. Aszódi, I. Lazányi, M. Premecz", "Approximate Ray-Tracing on the GPU with Distance Impostors", "CGF 24(3)", 2005;
     SZIRMAY_KALOS_2009 = "szirmay-kalos-2009": "L. Szirmay-Kalos, T. Umenhoffer, G. Patow, L. Szécsi, M. Sbert", "Specular Effects on the GPU: State of the Art", "CGF 28(6)", 2009;
     SZIRMAY_KALOS_LAZANYI_2006 = "szirmay-kalos-lazanyi-2006": "L. Szirmay-Kalos, I. Lazányi", "Indirect Diffuse and Glossy Illumination on the GPU", "SCCG", 2006;
+    TALBOT_2005 = "talbot-2005": "J. Talbot, D. Cline, P. Egbert", "Importance Resampling for Global Illumination", "EGSR", 2005;
     TURK_1994 = "turk-1994": "G. Turk", "The PLY Polygon File Format", "", 1994;
     UMENHOFFER_2007 = "umenhoffer-2007": "T. Umenhoffer, G. Patow, L. Szirmay-Kalos", "Robust Multiple Specular Reflections and Refractions", "GPU Gems 3", 2007;
     VEACH_1997 = "veach-1997": "E. Veach", "Robust Monte Carlo Methods for Light Transport Simulation", "PhD thesis, Stanford University", 1997;
@@ -160,6 +162,7 @@ sources! {
     WALTER_2005 = "walter-2005": "B. Walter et al.", "Lightcuts: A Scalable Approach to Illumination", "SIGGRAPH", 2005;
     WALTER_2007 = "walter-2007": "B. Walter, S. Marschner, H. Li, K. Torrance", "Microfacet Models for Refraction through Rough Surfaces", "EGSR", 2007;
     WARD_1991 = "ward-1991": "G. Ward", "Real Pixels", "Graphics Gems II", 1991;
+    WARD_SHADOW_1991 = "ward-shadow-1991": "G. Ward", "Adaptive Shadow Testing for Ray Tracing", "EGWR", 1991;
     WAVEFRONT_OBJ = "wavefront-obj": "Wavefront", "OBJ and MTL", "", 0;
     WILKIE_2014 = "wilkie-2014": "A. Wilkie et al.", "Hero Wavelength Spectral Sampling", "EGSR", 2014;
     WILLIAMS_1978 = "williams-1978": "L. Williams", "Casting Curved Shadows on Curved Surfaces", "SIGGRAPH", 1978;
@@ -167,5 +170,6 @@ sources! {
     WOODCOCK_1965 = "woodcock-1965": "E. Woodcock et al.", "Techniques Used in the GEM Code for Monte Carlo Neutronics Calculations", "ANL-7050", 1965;
     WOOP_2013 = "woop-2013": "S. Woop, C. Benthin, I. Wald", "Watertight Ray/Triangle Intersection", "JCGT 2(1)", 2013;
     YLITIE_2017 = "ylitie-2017": "H. Ylitie, T. Karras, S. Laine", "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", "HPG", 2017;
+    YUKSEL_2019 = "yuksel-2019": "C. Yuksel", "Stochastic Lightcuts", "HPG", 2019;
     ZHUKOV_1998 = "zhukov-1998": "S. Zhukov, A. Iones, G. Kronin", "An Ambient Light Illumination Model", "EGWR", 1998;
 }

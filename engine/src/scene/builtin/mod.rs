@@ -23,6 +23,7 @@ mod slab;
 mod soup;
 mod sphere_flake;
 mod textures;
+mod unit_box;
 mod volumes;
 
 pub use parameters::{Parameter, ParameterKind};
@@ -76,6 +77,7 @@ pub fn catalogue() -> &'static [Entry] {
         sphere_flake::SPHERE_FLAKE,
         furnace::SPHERE_LIGHT,
         soup::TRIANGLE_SOUP,
+        unit_box::UNIT_BOX,
         media::WAX,
         furnace::WHITE_FURNACE,
     ]

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::gather;
 use super::renderer::VirtualLights;
 use super::settings::VirtualLightSettings;
+use super::{cut_tree, gather, selection};
 use crate::Result;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
@@ -21,7 +21,7 @@ use crate::transport::{PathSet, SURFACE_FEATURES};
 pub(in crate::techniques) const CARD: Card = Card {
     id: "vpl",
     summary: "instant radiosity: indirect light as that of virtual point lights, new ones for each pass, with shadow rays and a compensated bound",
-    rows: &[ROWS, gather::ROWS],
+    rows: &[ROWS, gather::ROWS, cut_tree::ROWS, selection::ROWS],
     bias: BIAS,
     needs: &[],
     kernels: &[&path::KERNELS, &KERNELS],
@@ -107,6 +107,7 @@ impl Technique for VirtualLights {
             ("virtual_lights", c.lights),
             ("gathers", c.gather.gathers),
             ("connections", c.gather.connections),
+            ("light_nodes", c.gather.nodes),
         ])
     }
 
@@ -124,6 +125,14 @@ impl Technique for VirtualLights {
                 why,
             });
         }
+        if self.has_lights()
+            && let Some(why) = VirtualLights::settings(self).passes_over()
+        {
+            skipped.push(Skipped {
+                what: "virtual lights of little potential",
+                why,
+            });
+        }
         skipped
     }
 }
@@ -138,7 +147,7 @@ const ROWS: &[Row] = &[
         id: "SVO-G0",
         name: "technique `vpl`: direct light and mirrors by rays, all else from virtual point lights, new for each pass (instant radiosity)",
         role: Role::Technique,
-        limits: "Refuses scenes with media or unlit surfaces; light off a mirror or through smooth glass onto the first rough surface is no part of the picture; biased where a bound is not compensated, or by a limited number of steps; walks that go on over surfaces with interpolated or mapped normals scatter otherwise than eye paths, which bend these normals towards the eye; virtual lights within rounding of an edge shine past it; all pixels of a pass share its noise; of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
+        limits: "Refuses scenes with media or unlit surfaces; light off a mirror or through smooth glass onto the first rough surface is no part of the picture; biased where a bound is not compensated, by a limited number of steps, or by lights of little potential that are left out; walks that go on over surfaces with interpolated or mapped normals scatter otherwise than eye paths, which bend these normals towards the eye; virtual lights within rounding of an edge shine past it; all pixels of a pass share its noise; of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
         sources: &[
             sources::KELLER_1997.whole(),
             sources::KOLLIG_KELLER_2006.whole(),

@@ -5,11 +5,12 @@
 
 use std::cell::Cell;
 
-use super::settings::VirtualLightSettings;
+use super::settings::{Selection, VirtualLightSettings};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
-    INSTANCE_SEARCH_STEPS, LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD, PATH_SET_STATE_BITS,
+    INSTANCE_SEARCH_STEPS, LIGHT_CUT_MAX, LIGHT_TREE_DEPTH_MAX, LOBE_DIFFUSE, LOBE_REFLECTION, PATH_SET_DEAD,
+    PATH_SET_STATE_BITS, POTENTIAL_BINS,
 };
 use crate::gpu::shaders::sets::{VirtualLightSet, WaveSet};
 use crate::gpu::shaders::techniques::instant_radiosity::vpl_gather;
@@ -29,6 +30,8 @@ const LIGHTS_A_DISPATCH: u32 = 64;
 const QUOTA_WANTED: u32 = 256;
 /// Searches for an instance of a connection, beside those of its ray: three surfaces are looked up.
 const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
+/// Loop iterations that finding the potential of all lights takes at most, in the dispatch that a place begins in.
+const POTENTIAL_ITERATIONS: u32 = 1 << 15;
 /// Connections of a submission that goes on with places that have stopped, on software devices: a second or less on two cores.
 const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
 /// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections.
@@ -55,8 +58,10 @@ pub struct VirtualLightCounts {
     pub gathers: u64,
     /// Pairs of a point and a virtual light.
     pub connections: u64,
-    /// Those whose shadow ray was traced: the others bring nothing, whatever stands between.
+    /// Those whose shadow ray was traced: the others bring nothing, whatever stands between, or too little.
     pub shadow_rays: u64,
+    /// Nodes of the tree of virtual lights that points have looked at, where lights are chosen by cuts.
+    pub nodes: u64,
 }
 
 /// How many places a submission goes on with that have stopped: as many as a driver that watches has time for, by what the last one took.
@@ -102,7 +107,22 @@ pub(super) struct Gather {
     path_states: u32,
     bounces: [u32; 2],
     edge_bound: EdgeBound,
+    selected: Selected,
     pace: StoppedPace,
+}
+
+/// Which lights places take.
+struct Selected {
+    selection: Selection,
+    /// Share of the potential.
+    share: f32,
+    rescales: bool,
+    cut_size: u32,
+    candidates: u32,
+    /// Word behind the states of all places.
+    first: u32,
+    /// Lights that the potential can be found of.
+    most: u32,
 }
 
 /// Connections to the virtual lights of a pass, to be recorded with a wave.
@@ -110,6 +130,8 @@ pub(super) struct GatherStage<'a> {
     pub gather: &'a Gather,
     pub scene: &'a GpuScene,
     pub lights: &'a TexelView,
+    /// The tree over them, where they are chosen by cuts.
+    pub tree: Option<&'a TexelView>,
     pub count: u32,
     /// One over the walks of the pass.
     pub scale: f32,
@@ -123,9 +145,13 @@ type Counters = vpl_gather::VirtualLightCounters;
 
 impl Gather {
     /// What a place keeps between dispatches.
-    pub const STATE_BYTES: u64 = size_of::<GatherState>() as u64;
+    pub fn state_bytes(settings: &VirtualLightSettings) -> u64 {
+        const SELECTED_BYTES: u64 = 2 * size_of::<f32>() as u64;
+        let selected = settings.selection == Selection::Potential;
+        size_of::<GatherState>() as u64 + if selected { SELECTED_BYTES } else { 0 }
+    }
 
-    /// For eye paths of the set `eye`; `states` has [`STATE_BYTES`](Self::STATE_BYTES) for each that may be under way.
+    /// For eye paths of the set `eye`; `states` has [`state_bytes`](Self::state_bytes) for each that may be under way.
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
@@ -135,7 +161,16 @@ impl Gather {
         states: Buffer,
     ) -> Result<Self> {
         let profile = scene.profile();
-        let (lights_at_once, index_quota) = lights_at_once(gpu, scene, settings.lights_at_once)?;
+        let (once, each) = match settings.selection {
+            Selection::All => (0, 0),
+            Selection::Potential => (POTENTIAL_ITERATIONS + 2 * POTENTIAL_BINS, 0),
+            Selection::Cuts => {
+                let each = 1 + LIGHT_TREE_DEPTH_MAX + searches(scene);
+                let once = (LIGHT_CUT_MAX + LIGHT_TREE_DEPTH_MAX) * (LIGHT_CUT_MAX + 1);
+                (once, settings.candidates * each)
+            }
+        };
+        let (lights_at_once, index_quota) = lights_beside(gpu, scene, settings.lights_at_once, [once, each])?;
         let traversal = scene.index_traversal();
         let spec = surface_spec!(vpl_gather, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
@@ -144,12 +179,23 @@ impl Gather {
             has_path_automaton: eye.has_automaton(),
             edge_bound: edge_bound.kind(),
             counts_bounces: settings.least_bounces > 2 || settings.most().is_some(),
+            selection: settings.selection as u32,
             lights_at_once,
             index_quota,
             index_kind: traversal.kind(),
             ..Default::default()
         });
         let bytes = size_of::<Counters>() as u64;
+        let places = states.bytes() / Self::state_bytes(settings);
+        let selected = Selected {
+            selection: settings.selection,
+            share: settings.potential_share,
+            rescales: settings.rescales,
+            cut_size: settings.cut_size,
+            candidates: settings.candidates,
+            first: (places * size_of::<GatherState>() as u64 / size_of::<f32>() as u64) as u32,
+            most: POTENTIAL_ITERATIONS / (1 + searches(scene)),
+        };
         Ok(Self {
             pipeline: traversal.pipeline(gpu, &spec)?,
             states,
@@ -158,6 +204,7 @@ impl Gather {
             path_states: gathering_states(eye),
             bounces: [settings.least_bounces, settings.most().unwrap_or(u32::MAX)],
             edge_bound,
+            selected,
             pace: StoppedPace::new(gpu.caps().kind, lights_at_once),
         })
     }
@@ -173,7 +220,27 @@ impl Gather {
             gathers: u64::from(counters.gathers),
             connections: wide_counter(counters.connections),
             shadow_rays: wide_counter(counters.shadow_rays),
+            nodes: wide_counter(counters.nodes),
         })
+    }
+
+    /// Whether places can take their part of so many lights.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`] for more lights than the loops of a dispatch may find the potential of.
+    pub fn check(&self, lights: u32) -> Result<()> {
+        let selected = &self.selected;
+        if selected.selection == Selection::Potential && lights > selected.most {
+            return Err(Error::Overflow {
+                kernel: "vpl_gather".into(),
+                what: "virtual lights whose potential is found".into(),
+                needed: lights.into(),
+                capacity: selected.most.into(),
+                instead: "follow fewer walks per pass: setting `walks`; or choose lights by cuts: setting `selection`"
+                    .into(),
+            });
+        }
+        Ok(())
     }
 
     /// A submission in which the stage may have been recorded took so long.
@@ -186,8 +253,18 @@ impl Gather {
     }
 }
 
+/// Loop iterations of a connection beside those of its ray.
+fn searches(scene: &GpuScene) -> u32 {
+    if scene.profile().keeps_instances { SEARCHES } else { 0 }
+}
+
 /// Lights that a place takes in a dispatch, and loop iterations after which a shadow ray goes on in the next: together they stay below what software drivers run.
 pub(super) fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result<(u32, u32)> {
+    lights_beside(gpu, scene, wanted, [0, 0])
+}
+
+/// As [`lights_at_once`], beside so many iterations in all and for each light.
+fn lights_beside(gpu: &Gpu, scene: &GpuScene, wanted: u32, [once, more]: [u32; 2]) -> Result<(u32, u32)> {
     let filters = scene.profile().has_alpha();
     let mut lights = if wanted == 0 {
         LIGHTS_A_DISPATCH
@@ -196,8 +273,8 @@ pub(super) fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result
     };
     loop {
         // The loop over lights itself, and what a connection takes beside its ray.
-        let beside = 1 + if scene.profile().keeps_instances { SEARCHES } else { 0 };
-        let each = (SOFTWARE_LOOP_CAP / lights).saturating_sub(beside);
+        let beside = 1 + searches(scene) + more;
+        let each = ((SOFTWARE_LOOP_CAP - once) / lights).saturating_sub(beside);
         let lanes = if filters { gpu.caps().subgroup_size.max(1) } else { 1 };
         let quota = RAY_QUOTA.min(each / lanes);
         match scene.index_traversal().quota_within(gpu.caps(), quota, each, filters) {
@@ -233,6 +310,12 @@ impl GatherStage<'_> {
             seed: self.seed,
             first_place: 0,
             goes_on: 0,
+            geometry_most: self.gather.edge_bound.geometry_most(),
+            share: self.gather.selected.share,
+            rescales: self.gather.selected.rescales.into(),
+            cut_size: self.gather.selected.cut_size,
+            candidates: self.gather.selected.candidates,
+            first_selected: self.gather.selected.first,
         }
     }
 
@@ -242,6 +325,8 @@ impl GatherStage<'_> {
             virtual_light_states: self.gather.states.view(),
             gather_counters: self.gather.counters.view(),
             light_departures: self.departures.view(),
+            light_node_texels: self.tree.unwrap_or(self.lights),
+            selected_lights: self.gather.states.view(),
         }
     }
 }

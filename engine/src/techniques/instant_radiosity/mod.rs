@@ -2,13 +2,15 @@
 
 mod append;
 mod card;
+mod cut_tree;
 mod gather;
 pub mod many_light;
 mod renderer;
+pub mod selection;
 mod settings;
 
 pub(super) use card::CARD;
 pub use gather::VirtualLightCounts;
 pub(super) use many_light::CARD as MANY_LIGHT;
 pub use renderer::{PassCounts, VirtualLight, VirtualLights};
-pub use settings::{Bound, Compensation, VirtualLightSettings};
+pub use settings::{Bound, Compensation, Selection, VirtualLightSettings};

@@ -17,11 +17,13 @@ use std::time::Instant;
 
 use super::append::LightAppend;
 use super::card::refusals;
+use super::cut_tree::CutTree;
 use super::gather::{Gather, GatherStage, VirtualLightCounts};
-use super::settings::VirtualLightSettings;
+use super::settings::{Selection, VirtualLightSettings};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::shaders::constants::VIRTUAL_LIGHT_QUARTERS;
+use crate::gpu::shaders::types::SceneLightNode;
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
@@ -84,6 +86,8 @@ pub struct VirtualLights {
 struct Lights {
     tracer: PhotonTracer,
     gather: Gather,
+    /// Where lights are chosen by cuts.
+    tree: Option<CutTree>,
     /// The walks of the pass under way, until all have ended.
     tracing: Option<Tracing>,
     /// How many virtual lights there are in the pass under way.
@@ -147,12 +151,16 @@ impl VirtualLights {
             ..PathTracerSettings::default()
         };
         // Takes as much memory as is left, if it must, with what gathering keeps.
-        let kept = if has_lights { Gather::STATE_BYTES } else { 0 };
+        let kept = if has_lights { Gather::state_bytes(&settings) } else { 0 };
         let eye = PathTracer::beyond(gpu, Arc::clone(&scene), camera, size, eye_settings, bound, kept)?;
         let lights = match tracer {
             Some(tracer) => Some(Lights {
                 tracer,
                 gather: Gather::new(gpu, &scene, &settings, &eye_paths, bound, eye.stage_memory())?,
+                tree: match settings.selection {
+                    Selection::Cuts => Some(CutTree::new(gpu, &scene)?),
+                    Selection::All | Selection::Potential => None,
+                },
                 tracing: None,
                 count: None,
             }),
@@ -205,6 +213,7 @@ impl VirtualLights {
         if let Some(lights) = &self.lights {
             all.extend(lights.tracer.pipelines());
             all.push(lights.gather.pipeline());
+            all.extend(lights.tree.iter().flat_map(CutTree::pipelines));
         }
         all
     }
@@ -244,8 +253,8 @@ impl VirtualLights {
     /// samples are there.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] for more virtual lights than the device can hold, and should the index have rays
-    /// that never end.
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] for more virtual lights than the device can hold, more than it can make a tree of or
+    /// find the potential of where the settings ask for that, and should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         let (done, each) = (self.eye.samples_done(), self.settings.samples_per_pass);
         let Some([pass, end]) = self.eye.pass_towards(samples, each) else {
@@ -257,9 +266,15 @@ impl VirtualLights {
             let begun = lights.tracing.take();
             let mut tracing = begun.unwrap_or_else(|| lights.tracer.begin(pass, None));
             let all = lights.tracer.advance(&mut tracing)?;
-            let timings = tracing.take_timings();
+            let mut timings = tracing.take_timings();
             if all {
                 let traced = tracing.into_traced();
+                lights.gather.check(traced.records)?;
+                if let Some(tree) = &mut lights.tree
+                    && traced.records > 0
+                {
+                    timings.push(tree.build(&self.scene, lights.tracer.records(), traced.records)?);
+                }
                 lights.count = Some(traced.records);
                 self.counts.passes += 1;
                 self.counts.walks += traced.counts;
@@ -274,12 +289,14 @@ impl VirtualLights {
             Some(Lights {
                 tracer,
                 gather,
+                tree,
                 count: Some(count),
                 ..
             }) if *count > 0 => Some(GatherStage {
                 gather,
                 scene: &self.scene,
                 lights: tracer.records(),
+                tree: tree.as_ref().and_then(CutTree::nodes),
                 count: *count,
                 scale: 1.0 / self.settings.walks as f32,
                 departures: self.eye.departures(),
@@ -302,6 +319,7 @@ impl VirtualLights {
                 self.counts.gather.gathers += counts.gathers;
                 self.counts.gather.connections += counts.connections;
                 self.counts.gather.shadow_rays += counts.shadow_rays;
+                self.counts.gather.nodes += counts.nodes;
             }
             if self.eye.has_ended_pass(done, each) {
                 lights.count = None;
@@ -320,16 +338,13 @@ impl VirtualLights {
     /// # Errors
     /// As [`VirtualLights::step`].
     pub fn lights(&mut self, pass: u32) -> Result<Vec<VirtualLight>> {
-        let scale = 1.0 / self.settings.walks as f32;
-        let Some(lights) = &mut self.lights else {
+        let (gpu, scale) = (self.gpu.clone(), 1.0 / self.settings.walks as f32);
+        let Some((lights, count)) = self.follow(pass)? else {
             return Ok(Vec::new());
         };
-        (lights.tracing, lights.count) = (None, None);
-        let traced = lights.tracer.trace(pass, None)?;
-        self.counts.walks += traced.counts;
         let records = lights.tracer.records().buffer().view();
         type Record = [[u32; 4]; VIRTUAL_LIGHT_QUARTERS as usize];
-        let records: Vec<Record> = self.gpu.read(records, traced.records as usize)?;
+        let records: Vec<Record> = gpu.read(records, count as usize)?;
         let vector = |quarter: &[u32; 4]| Vec3::from_array([0, 1, 2].map(|i| f32::from_bits(quarter[i])));
         let light = |record: &Record| VirtualLight {
             position: vector(&record[0]),
@@ -338,6 +353,41 @@ impl VirtualLights {
             bounce: record[3][3],
         };
         Ok(records.iter().map(light).collect())
+    }
+
+    /// Follows the walks of a pass as [`VirtualLights::lights`] does, and returns the tree over the virtual lights that they leave
+    /// ([`perfect_light_tree`](crate::transport::light_tree::perfect_light_tree)): strengths are those of all walks together. Empty where lights are not chosen by
+    /// cuts, or there are none.
+    ///
+    /// # Errors
+    /// As [`VirtualLights::step`].
+    pub fn light_tree(&mut self, pass: u32) -> Result<Vec<SceneLightNode>> {
+        let (gpu, scene) = (self.gpu.clone(), Arc::clone(&self.scene));
+        match self.follow(pass)? {
+            Some((
+                Lights {
+                    tracer,
+                    tree: Some(tree),
+                    ..
+                },
+                count,
+            )) if count > 0 => {
+                tree.build(&scene, tracer.records(), count)?;
+                tree.read(&gpu, count)
+            }
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// Follows the walks of a pass outside of the picture; the lights, and how many records they left.
+    fn follow(&mut self, pass: u32) -> Result<Option<(&mut Lights, u32)>> {
+        let Some(lights) = &mut self.lights else {
+            return Ok(None);
+        };
+        (lights.tracing, lights.count) = (None, None);
+        let traced = lights.tracer.trace(pass, None)?;
+        self.counts.walks += traced.counts;
+        Ok(Some((lights, traced.records)))
     }
 
     /// The picture so far, as [`PathTracer::picture`] has it.

@@ -1,5 +1,6 @@
 //! Settings of virtual point lights, and the path sets of their two parts.
 
+use crate::gpu::shaders::constants::{CUT_CANDIDATES_MAX, LIGHT_CUT_MAX, SELECT_ALL, SELECT_CUTS, SELECT_POTENTIAL};
 use crate::techniques::path::SAMPLES_PER_WAVE;
 use crate::transport::PathSet;
 use crate::transport::edge_bound::EdgeBound;
@@ -54,6 +55,19 @@ pub enum Compensation {
     Rays,
 }
 
+/// Which virtual lights send a place shadow rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Selection {
+    /// All of them.
+    #[default]
+    All = SELECT_ALL as isize,
+    /// The strongest, by what they would bring if nothing stood between, that carry a share of the sum: biased.
+    Potential = SELECT_POTENTIAL as isize,
+    /// One below each node of a cut through a tree of them, over its probability: unbiased, in time that hardly grows with their number.
+    Cuts = SELECT_CUTS as isize,
+}
+
 crate::settings! {
     /// Settings of virtual point lights.
     pub struct VirtualLightSettings {
@@ -75,6 +89,26 @@ crate::settings! {
         pub compensation: Compensation = Compensation::Rays;
         /// Scatterings of eye paths that go on for the compensation, at most, which leaves a part of the light out; 0 goes on until the weight is zero.
         pub compensation_steps: u32 = 0, in 0..=8, unit "scatterings";
+        /// Which virtual lights send a place shadow rays: all, the strongest, or by chance one below each node of a cut through a tree of them.
+        ///
+        /// All and cuts have the same expected picture; the strongest alone bias it, as `rescales` says.
+        pub selection: Selection = Selection::All;
+        /// Of `selection` potential: the share of what all lights would bring if nothing stood between that those taken carry.
+        pub potential_share: f32 = 0.9, in 0.0..=1.0, unit "of the potential";
+        /// Of `selection` potential: multiplies what the lights taken bring by what all would bring over what they would, as if the others were seen as often.
+        ///
+        /// Without it pictures are too dark by the others' light; with it a few hundredths too bright, since weak lights are seen less often. The source calls it a
+        /// compensation.
+        pub rescales: bool = true;
+        /// Of `selection` cuts: nodes of a place's cut, and so shadow rays at most; more give less noise.
+        ///
+        /// Source: C. Yuksel, "Stochastic Lightcuts", HPG 2019.
+        pub cut_size: u32 = 16, in 1..=LIGHT_CUT_MAX, unit "nodes";
+        /// Of `selection` cuts: lights that are drawn below each node, of which one is kept by what they would bring if nothing stood between; more give less noise
+        /// for a shadow ray, and take as many looks at surfaces.
+        ///
+        /// Source: J. Talbot, D. Cline and P. Egbert, "Importance Resampling for Global Illumination", EGSR 2005.
+        pub candidates: u32 = 1, in 1..=CUT_CANDIDATES_MAX, unit "lights";
         /// Ends walks by one number each, evenly spread over a pass, so that as many survive each scattering as albedos say, instead of by a
         /// roulette at each; changes the noise only.
         ///
@@ -135,6 +169,16 @@ impl VirtualLightSettings {
             (Bound::None, ..) | (_, Compensation::Rays, 0) => None,
             (_, Compensation::Rays, _) => Some("the compensation ends after some scatterings"),
             (_, Compensation::None, _) => Some("the bound is not compensated"),
+        }
+    }
+
+    /// What becomes of the light of virtual lights that places do not take, if they do not take all or some by chance.
+    pub(super) fn passes_over(&self) -> Option<&'static str> {
+        match (self.selection, self.rescales) {
+            (Selection::Potential, _) if self.potential_share >= 1.0 => None,
+            (Selection::Potential, true) => Some("those taken stand for them, as if they were seen as often"),
+            (Selection::Potential, false) => Some("they carry too little of the potential"),
+            (Selection::All | Selection::Cuts, _) => None,
         }
     }
 

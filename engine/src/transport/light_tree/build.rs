@@ -49,7 +49,7 @@ pub struct FixedLight {
 }
 
 impl LightBounds {
-    fn union(&self, other: &Self) -> Self {
+    pub(super) fn union(&self, other: &Self) -> Self {
         Self {
             lower: self.lower.min(other.lower),
             upper: self.upper.max(other.upper),
@@ -68,7 +68,7 @@ impl LightBounds {
     }
 
     /// A node around what is here, in f32 that hold no less.
-    fn node(&self) -> SceneLightNode {
+    pub(super) fn node(&self) -> SceneLightNode {
         let center = self.middle().as_vec3();
         let half = (self.upper - center.as_dvec3()).max(center.as_dvec3() - self.lower);
         let half = Vec3::from_array(half.to_array().map(|h| {

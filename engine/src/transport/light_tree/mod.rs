@@ -14,11 +14,13 @@
 
 mod build;
 mod cone;
+mod cut;
 #[cfg(test)]
 mod tests;
 
 pub use build::{FixedLight, LightBounds, NearLight, build_light_tree};
 pub use cone::{LightCone, cone_measure, cone_union};
+pub use cut::{CUT_MAX, CutReceiver, light_node_union, perfect_light_tree};
 
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{

@@ -17,6 +17,7 @@ mod preview;
 mod rays;
 mod rendering;
 mod surfaces;
+mod virtual_lights;
 mod wide;
 
 use clerestory::{Error, Result};
@@ -168,6 +169,9 @@ measures! {
     on_device "technique-choice" rendering::technique_choice;
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
+    on_host "vpl-order" virtual_lights::vpl_order;
+    on_device "vpl-potential" virtual_lights::vpl_potential;
+    on_host "vpl-walks" virtual_lights::vpl_walks;
     on_device "walk-agreement" rendering::walk_agreement;
 }
 

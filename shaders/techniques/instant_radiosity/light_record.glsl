@@ -1,0 +1,7 @@
+// The size of a virtual light's record (virtual_light.glsl).
+#ifndef CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_LIGHT_RECORD_GLSL
+#define CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_LIGHT_RECORD_GLSL
+
+const uint VIRTUAL_LIGHT_QUARTERS = 4u;
+
+#endif
