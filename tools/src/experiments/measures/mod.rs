@@ -114,6 +114,7 @@ measures! {
     on_device "gather-places" impostors::gather_places;
     on_device "gather-table" impostors::gather_table;
     on_device "gather-terms" impostors::gather_terms;
+    on_device "imperfect-maps" preview::imperfect_maps;
     on_device "impostor-methods" impostors::impostor_methods;
     on_host "impostor-roots" impostors::impostor_roots;
     on_device "kd-caches" kd::kd_caches.of_any_scenes();
@@ -168,6 +169,7 @@ measures! {
     on_device "technique-choice" rendering::technique_choice;
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
+    on_host "vpl-warp" preview::vpl_warp;
 }
 
 /// The measure of that name.
