@@ -64,6 +64,8 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::raster::octants::ROWS,
     crate::raster::omni_shadow::ROWS,
     crate::raster::pipelines::ROWS,
+    crate::raster::reflective::ROWS,
+    crate::raster::splat_atlas::ROWS,
     crate::raster::splats::ROWS,
     crate::raster::tessellation::ROWS,
     crate::scene::builtin::ROWS,

@@ -6,7 +6,8 @@
 //! T. Saito and T. Takahashi, "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); T. Engelhardt, "Efficient Visibility for
 //! Realistic Rendering", 2013, §2.1 (both forms of visibility) and §7.2 (octahedra rendered live).
 //!
-//! [`OmniShadowMaps`] keep the distances that point lights see in all directions, and say which places their light reaches.
+//! [`OmniShadowMaps`] keep the distances that point lights see in all directions, and say which places their light reaches;
+//! [`SplatAtlas`](splat_atlas::SplatAtlas) keeps those of many lights, drawn at once from points of the surfaces.
 //!
 //! Guarantee: what is seen at a pixel is what the ray through its centre meets, but where that centre lies within the rounding of vertices
 //! from an edge of a triangle, or where triangles are equally far within the rounding of depths; distances and weights are the ray caster's
@@ -20,6 +21,8 @@ pub mod octants;
 pub(crate) mod omni_shadow;
 mod output;
 pub(crate) mod pipelines;
+pub mod reflective;
+pub mod splat_atlas;
 pub mod splats;
 mod surfaces;
 pub mod tessellation;

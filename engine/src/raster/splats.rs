@@ -314,11 +314,24 @@ fn splat_pushed(texels: &mut [Option<Splat>], fine: SplatLevel, coarse: SplatLev
 /// whole, at a place of the triangle by a low-discrepancy sequence (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences",
 /// 2018). Their numbers are those of the triangles. None without area.
 pub fn surfels_of(triangles: &[[Vec3; 3]], count: u32) -> Vec<Surfel> {
+    let (places, _) = places_on(triangles, count);
+    places
+        .map(|(number, uv)| {
+            let [a, b, c] = triangles[number as usize].map(|corner| corner.as_dvec3());
+            Surfel {
+                position: (a + uv.x * (b - a) + uv.y * (c - a)).as_vec3().to_array(),
+                number,
+            }
+        })
+        .collect()
+}
+
+/// The triangles and the weights of corners 1 and 2 there of the points of [`surfels_of`], and the area of all triangles, m².
+pub(super) fn places_on(triangles: &[[Vec3; 3]], count: u32) -> (impl Iterator<Item = (u32, DVec2)>, f64) {
     /// 1/g and 1/g² of the plastic number g.
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2);
-    let corners = |t: &[Vec3; 3]| t.map(|corner| corner.as_dvec3());
-    let area = |t: &[Vec3; 3]| {
-        let [a, b, c] = corners(t);
+    let double_area = |t: &[Vec3; 3]| {
+        let [a, b, c] = t.map(|corner| corner.as_dvec3());
         let double = (b - a).cross(c - a).length();
         if double.is_finite() { double } else { 0.0 }
     };
@@ -326,27 +339,20 @@ pub fn surfels_of(triangles: &[[Vec3; 3]], count: u32) -> Vec<Surfel> {
     let sums: Vec<f64> = triangles
         .iter()
         .map(|t| {
-            reached += area(t);
+            reached += double_area(t);
             reached
         })
         .collect();
-    if reached <= 0.0 {
-        return Vec::new();
-    }
-    (0..count)
-        .map(|k| {
-            let at = (f64::from(k) + 0.5) / f64::from(count) * reached;
-            let number = sums.partition_point(|sum| *sum <= at).min(triangles.len() - 1);
-            let [a, b, c] = corners(&triangles[number]);
-            let place = (DVec2::splat(0.5) + f64::from(k) * STEP).fract_gl();
-            // The square folded along its diagonal.
-            let uv = if place.element_sum() > 1.0 { 1.0 - place } else { place };
-            Surfel {
-                position: (a + uv.x * (b - a) + uv.y * (c - a)).as_vec3().to_array(),
-                number: number as u32,
-            }
-        })
-        .collect()
+    let count = if reached > 0.0 { count } else { 0 };
+    let places = (0..count).map(move |k| {
+        let at = (f64::from(k) + 0.5) / f64::from(count) * reached;
+        let number = sums.partition_point(|sum| *sum <= at).min(sums.len() - 1);
+        let place = (DVec2::splat(0.5) + f64::from(k) * STEP).fract_gl();
+        // The square folded along its diagonal.
+        let uv = if place.element_sum() > 1.0 { 1.0 - place } else { place };
+        (number as u32, uv)
+    });
+    (places, 0.5 * reached)
 }
 
 /// Rows of the catalogue.

@@ -53,14 +53,10 @@ impl View {
         if !frame.orthographic {
             return Self::central(origin, rows, reach * NEAR, area);
         }
-        let mut view = Self::central(origin, rows, 0.0, area)?;
+        let view = Self::central(origin, rows, 0.0, area)?;
         // Behind all of the scene, if there is any.
         let far = f64::from(if reach > 0.0 { 2.0 * reach } else { 1.0 });
-        let record = &mut view.record;
-        record.z = (-forward / far).as_vec3().extend(1.0).to_array();
-        record.w = [0.0, 0.0, 0.0, 1.0];
-        record.parallel = 1;
-        Ok(view)
+        Ok(view.into_parallel(forward, far))
     }
 
     /// What is seen from a point through a face of a cube map ([`crate::maps::cube`]).
@@ -87,6 +83,50 @@ impl View {
         let mut view = Self::central(origin, [DVec3::X, DVec3::Y, side], near, area)?;
         view.record.signs = side.as_vec3().to_array();
         Ok(view)
+    }
+
+    /// What is seen from a point about an axis of length 1, in a square whose sides are seen under that angle from it, radians, above 0 and below a quarter turn.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for such an angle, or a place or near plane that is not finite.
+    pub fn of_square(origin: Vec3, axis: Vec3, half_angle: f32, near: f32, area: Area) -> Result<Self> {
+        let half_side = f64::from(half_angle).tan();
+        if !(half_angle > 0.0 && half_angle < std::f32::consts::FRAC_PI_2 && half_side.is_finite()) {
+            return Err(Error::setting(
+                "half angle",
+                half_angle,
+                "is not between 0 and a quarter turn",
+            ));
+        }
+        let axis = axis.as_dvec3();
+        let (right, down) = axis.any_orthonormal_pair();
+        Self::central(origin, [right / half_side, down / half_side, axis], near, area)
+    }
+
+    /// What parallel rays along a direction of length 1 meet of surfaces: all of them, in a square as wide as the sphere about their bounds.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for bounds that are not finite.
+    pub fn of_beam(direction: Vec3, surfaces: &Surfaces<'_>, area: Area) -> Result<Self> {
+        let [lower, upper] = surfaces.bounds;
+        let radius = 0.5 * (upper - lower).length();
+        // Behind all of the scene, if there is any.
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        let origin = 0.5 * (lower + upper) - radius * direction;
+        let forward = direction.as_dvec3();
+        let (right, down) = forward.any_orthonormal_pair();
+        let half_side = f64::from(radius);
+        let view = Self::central(origin, [right / half_side, down / half_side, forward], 0.0, area)?;
+        Ok(view.into_parallel(forward, 4.0 * half_side))
+    }
+
+    /// The same with parallel rays along its axis, up to a distance.
+    fn into_parallel(mut self, forward: DVec3, far: f64) -> Self {
+        let record = &mut self.record;
+        record.z = (-forward / far).as_vec3().extend(1.0).to_array();
+        record.w = [0.0, 0.0, 0.0, 1.0];
+        record.parallel = 1;
+        self
     }
 
     /// The near plane that [`View::of_camera`] takes from here: 2⁻¹⁴ of the distance to the farthest surface, metres.
@@ -160,6 +200,16 @@ impl View {
     /// Where rays begin, metres; of parallel views, the middle of where they do.
     pub fn origin(&self) -> Vec3 {
         Vec3::from_array(self.record.origin)
+    }
+
+    /// Whether its rays are parallel.
+    pub fn is_parallel(&self) -> bool {
+        self.record.parallel != 0
+    }
+
+    /// The ray through the place (u, v) of its picture, from (−1, −1) to (1, 1), goes along the third of these and u and v times the others.
+    pub fn axes(&self) -> [Vec3; 3] {
+        [self.record.right, self.record.down, self.record.forward].map(Vec3::from_array)
     }
 
     /// The signs of the octant that it shows, the third alone for halves of a paraboloid map; zeros for other views.

@@ -47,7 +47,7 @@ layout(push_constant, scalar) uniform Push {
 
 layout(set = 0, binding = 0) uniform utextureBuffer virtual_light_texels;
 
-#include "techniques/instant_radiosity/connection.glsl"
+#include "techniques/instant_radiosity/seen_receiver.glsl"
 #include "transport/microfacet_albedo.glsl"
 
 layout(set = 0, binding = 1, scalar) restrict readonly buffer SplitPlaces { SplitPlace split_places[]; };
@@ -66,17 +66,7 @@ bool begin_receiver(uint place, out Receiver r) {
     if (seen.triangle == NO_HIT || !interleave_merge(place, uvec2(push.seen.width, push.seen.height), push.interleave, pixel)) {
         return false;
     }
-    vec3 origin;
-    vec3 direction = seen_direction(push.seen, pixel, origin);
-    r.arrival = arrival_at(Hit(0.0, seen.weights, seen.triangle), direction, push.scene_lower, push.scene_upper);
-    if (!arrival_has_rough_lobes(r.arrival)) {
-        return false;
-    }
-    r.bounce = 0u;
-    r.interior = arrival_interior(r.arrival, OUTSIDE);
-    r.throughput = absorbed(vec3(1.0), r.interior, distance(origin, r.arrival.surface.point.position));
-    r.frame = scattering_frame(r.arrival, arrival_normal(r.arrival));
-    return true;
+    return receiver_of_pixel(push.seen, pixel, seen, r);
 }
 
 // Share of a light that comes to the receiver over a connection; false where the ray that tells is stopped.

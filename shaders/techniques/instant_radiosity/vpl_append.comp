@@ -8,8 +8,7 @@ layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
 #include "techniques/photon_mapping/photon_wave.glsl"
-#include "transport/arrival.glsl"
-#include "techniques/instant_radiosity/virtual_light.glsl"
+#include "techniques/instant_radiosity/new_virtual_light.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -34,15 +33,7 @@ void main() {
     vec3 direction = uintBitsToFloat(texelFetch(walk_waiting_in, source + 2).xyz);
     vec2 barycentrics = uintBitsToFloat(where.xy);
     Arrival a = arrival_at(Hit(0.0, barycentrics, where.z), direction, push.scene_lower, push.scene_upper);
-    VirtualLight light;
-    light.position = a.surface.point.position;
-    light.triangle = where.z;
-    light.normal = a.facing;
-    light.offset = dot(abs(a.facing), a.surface.point.error);
-    light.power = power;
-    light.direction = direction;
-    light.surface = LAMBERT ? cosine_lobes(a.bsdf, 1.0, false, LOBE_DIFFUSE).diffuse : vec3(barycentrics, 0.0);
-    light.bounce = where.w;
+    VirtualLight light = new_virtual_light(a, where.z, barycentrics, power, direction, where.w);
     uvec4 quarters[VIRTUAL_LIGHT_QUARTERS];
     pack_virtual_light(light, quarters);
     for (uint i = 0u; i < VIRTUAL_LIGHT_QUARTERS; ++i) {

@@ -1,12 +1,16 @@
 //! Deferred frames of many lights against the path tracer, against themselves without tiles, and by exact counts.
 
+mod discs;
+mod reflective;
 mod tiles;
+
+use std::collections::BTreeSet;
 
 use super::*;
 use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{AlphaMode, Environment};
-use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Visibility};
+use clerestory::scene::{AlphaMode, Camera, Environment};
+use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Placement, Visibility};
 use clerestory_hard_cases::scenes::orthographic;
 use clerestory_tests::child::hash_in_child;
 use clerestory_tests::render::{camera_down, floor};
@@ -142,14 +146,33 @@ fn direct_light_is_the_path_tracers() {
     });
 }
 
+/// Seen in perspective through a lens, with the sky in view and rough metal from close by: what is seen depends on the direction.
+#[test]
+fn direct_light_is_the_path_tracers_through_any_camera() {
+    with_gpu(|gpu| {
+        let mut scene = furnished();
+        let (eye, target) = (DVec3::new(1.3, 1.3, 1.1), DVec3::new(-0.2, 1.0, 0.0));
+        scene.cameras[0] = Camera {
+            lens_radius: 0.02,
+            focus_distance: 1.5,
+            ..Camera::look_at("close", eye, target, DVec3::Y, 1.0)
+        };
+        let reference = render(gpu, &scene, SIZE, 4096, &paths(UP_TO_ONCE));
+        let mut renderer = frames(gpu, &scene, SIZE, &of(UP_TO_ONCE, exact()));
+        let found = passes_of(&mut renderer, SIZE, 1, 128);
+        found.expect_same_as("a close view", &reference, 0.0);
+    });
+}
+
 #[test]
 fn frames_do_not_depend_on_how_work_is_shared_out() {
     with_gpu(|gpu| {
         let scene = hall();
-        for visibility in [Visibility::Rays, Visibility::Maps] {
+        for visibility in [Visibility::Rays, Visibility::Maps, Visibility::Imperfect] {
             let base = ManyLightSettings {
                 visibility,
                 map_side: 16,
+                map_points: 256,
                 interleave: 3,
                 lights: 50,
                 ..exact()
@@ -162,7 +185,9 @@ fn frames_do_not_depend_on_how_work_is_shared_out() {
                 (radiance, counts)
             };
             let whole = all(&base);
-            assert_eq!(whole.1.maps > 0, visibility == Visibility::Maps);
+            assert_eq!(whole.1.maps > 0, visibility != Visibility::Rays);
+            let splats = if visibility == Visibility::Imperfect { 256 } else { 0 };
+            assert_eq!(whole.1.splats, splats * whole.1.maps);
             let parted = ManyLightSettings {
                 lights_at_once: 3,
                 maps_at_once: 7,
@@ -222,6 +247,17 @@ fn what_is_not_needed_is_not_recorded() {
         assert_eq!(passes, 6 + 2 * maps);
         assert_eq!(kernels, [true, true, true, true]);
         assert!(bytes_of_maps > bytes);
+        // Points, places of the lights, splats and fill, for however many lights; nothing is rasterized for them.
+        let imperfect = ManyLightSettings {
+            visibility: Visibility::Imperfect,
+            map_points: 64,
+            ..by_maps.clone()
+        };
+        let (passes, maps, kernels, bytes_of_imperfect) = once(&imperfect);
+        assert!(maps > 32 && maps <= 64, "{maps}");
+        assert_eq!((passes, kernels), (6 + 4, [true, true, true, false]));
+        // 64 maps of 8² texels with two coarser levels, 64 · 16 points of 16 + 12 bytes, 64 places.
+        assert_eq!(bytes_of_imperfect - bytes, 4 * 64 * (64 + 16 + 4) + 28 * 1024 + 16 * 64);
         // Positions and normals of 16 · 8 pixels, and colours of 16 tiles with 64 places each; without a filter the least that a buffer has.
         let filtered = ManyLightSettings {
             filter: true,
@@ -293,20 +329,26 @@ fn scenes_without_lights_are_black_and_walks_that_leave_do_no_harm() {
     });
 }
 
-/// The same lights, seen through everything, by coarse maps, by finer ones, and by rays.
+/// The same lights, seen through everything, by imperfect maps, by coarse exact ones, by finer ones, and by rays.
 #[test]
 fn errors_of_visibility_fall_from_none_over_maps_to_rays() {
     with_gpu(|gpu| {
         let scene = hall();
-        let by = |visibility, map_side| {
+        let mut tests = BTreeSet::new();
+        let mut by = |visibility, map_side| {
             let settings = ManyLightSettings {
                 lights: 48,
                 interleave: 1,
                 visibility,
                 map_side,
+                map_points: if map_side == 16 { 256 } else { 4096 },
                 ..exact()
             };
-            picture(gpu, &scene, [24; 2], &of(INDIRECT, settings), 2)
+            let mut renderer = frames(gpu, &scene, [24; 2], &of(INDIRECT, settings));
+            let [radiance, _] = advance(&mut renderer, 2);
+            let counts = renderer.counts();
+            tests.insert((counts.lights, counts.connections, counts.visibility_tests));
+            radiance
         };
         let rays = by(Visibility::Rays, 8);
         let error = |radiance: Vec<f32>| rmse(&radiance, &rays) / mean(&rays, 0);
@@ -314,11 +356,17 @@ fn errors_of_visibility_fall_from_none_over_maps_to_rays() {
         // What is hidden is missing from no picture.
         assert!(none.iter().zip(&rays).all(|(none, rays)| none >= rays));
         let [none, coarse, fine] = [none, by(Visibility::Maps, 16), by(Visibility::Maps, 128)].map(error);
-        println!("none {none:.4}, maps of 16 {coarse:.4}, of 128 {fine:.4}");
+        let [few, many] = [16, 128].map(|side| error(by(Visibility::Imperfect, side)));
+        println!("none {none:.4}, exact maps of 16 {coarse:.4}, of 128 {fine:.4}, imperfect {few:.4}, {many:.4}");
         assert!(
             none > 2.0 * coarse && coarse > 2.0 * fine && fine > 0.0,
             "{none} {coarse} {fine}"
         );
+        assert!(
+            none > 1.5 * few && few > 1.2 * many && many > fine,
+            "{none} {few} {many} {fine}"
+        );
+        assert_eq!(tests.len(), 1, "whatever tells, the same pairs ask: {tests:?}");
     });
 }
 
@@ -370,6 +418,14 @@ fn what_frames_cannot_model_is_refused_by_name() {
                 "interleave",
             ),
             (ManyLightSettings { map_side: 4, ..exact() }, "map_side"),
+            (
+                ManyLightSettings {
+                    map_points: 63,
+                    ..exact()
+                },
+                "map_points",
+            ),
+            (ManyLightSettings { map_fill: 7, ..exact() }, "map_fill"),
         ] {
             let error = ManyLight::new(gpu, scene.clone(), camera, SIZE, settings).err();
             let text = error.map(|error| error.to_string()).unwrap_or_default();
@@ -398,10 +454,11 @@ fn prints_its_hash_when_asked() {
     }
     with_gpu(|gpu| {
         let mut all = Vec::new();
-        for visibility in [Visibility::Rays, Visibility::Maps] {
+        for visibility in [Visibility::Rays, Visibility::Maps, Visibility::Imperfect] {
             let settings = ManyLightSettings {
                 visibility,
                 map_side: 16,
+                map_points: 256,
                 lights: 50,
                 filter: true,
                 sampler: SamplerKind::Sobol,
@@ -409,6 +466,12 @@ fn prints_its_hash_when_asked() {
             };
             all.extend(bits(&picture(gpu, &hall(), [13, 7], &settings, 1)));
         }
+        let settings = ManyLightSettings {
+            placement: Placement::Rsm,
+            rsm_side: 16,
+            ..exact()
+        };
+        all.extend(bits(&picture(gpu, &furnished(), [13, 7], &settings, 1)));
         // FNV-1a over words.
         let hash = all.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, word| {
             (hash ^ u64::from(*word)).wrapping_mul(0x0100_0000_01b3)

@@ -9,6 +9,7 @@ mod layers;
 mod normal_maps;
 mod oracle;
 mod parallel;
+mod splat_atlas;
 mod splats;
 
 use clerestory::gpu::ash::vk;

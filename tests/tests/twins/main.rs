@@ -17,6 +17,7 @@ mod photons;
 mod random;
 mod raster;
 mod reflection;
+mod reflective;
 mod scattering;
 mod shadows;
 mod sums;

@@ -27,15 +27,18 @@ sources! {
     BLINN_1977 = "blinn-1977": "J. Blinn", "Models of Light Reflection for Computer Synthesized Pictures", "SIGGRAPH", 1977;
     BLINN_NEWELL_1976 = "blinn-newell-1976": "J. Blinn, M. Newell", "Texture and Reflection in Computer Generated Images", "CACM 19(10)", 1976;
     BORN_WOLF_1999 = "born-wolf-1999": "M. Born, E. Wolf", "Principles of Optics, 7th edition", "Cambridge University Press", 1999;
+    BOTSCH_2005 = "botsch-2005": "M. Botsch, A. Hornung, M. Zwicker, L. Kobbelt", "High-Quality Surface Splatting on Today's GPUs", "PBG", 2005;
     BURLEY_2020 = "burley-2020": "B. Burley", "Practical Hash-based Owen Scrambling", "JCGT 10(4)", 2020;
     CHANDRASEKHAR_1960 = "chandrasekhar-1960": "S. Chandrasekhar", "Radiative Transfer", "Dover", 1960;
     CIGOLLE_2014 = "cigolle-2014": "Z. Cigolle et al.", "A Survey of Efficient Representations for Independent Unit Vectors", "JCGT 3(2)", 2014;
+    CLARBERG_2005 = "clarberg-2005": "P. Clarberg, W. Jarosz, T. Akenine-Möller, H. W. Jensen", "Wavelet Importance Sampling: Efficiently Evaluating Products of Complex Functions", "SIGGRAPH", 2005;
     CLARBERG_2008 = "clarberg-2008": "P. Clarberg", "Fast Equal-Area Mapping of the (Hemi)Sphere using SIMD", "JGT 13(3)", 2008;
     COLEMAN_1968 = "coleman-1968": "W. Coleman", "Mathematical Verification of a Certain Monte Carlo Sampling Technique", "Nuclear Science and Engineering 32", 1968;
     CONTY_KULLA_2018 = "conty-kulla-2018": "A. Conty Estevez, C. Kulla", "Importance Sampling of Many Lights with Adaptive Tree Splitting", "PACMCGIT 1(2) (HPG)", 2018;
     COOK_TORRANCE_1982 = "cook-torrance-1982": "R. Cook, K. Torrance", "A Reflectance Model for Computer Graphics", "ACM TOG 1(1)", 1982;
     CORNELL_BOX_DATA = "cornell-box-data": "Cornell University Program of Computer Graphics", "Cornell Box Data", "graphics.cornell.edu/online/box/data.html", 0;
     CROW_1984 = "crow-1984": "F. Crow", "Summed-Area Tables for Texture Mapping", "SIGGRAPH", 1984;
+    DACHSBACHER_STAMMINGER_2005 = "dachsbacher-stamminger-2005": "C. Dachsbacher, M. Stamminger", "Reflective Shadow Maps", "I3D", 2005;
     DAVIDOVIC_2014 = "davidovic-2014": "T. Davidovič, J. Křivánek, M. Hašan, P. Slusallek", "Progressive Light Transport Simulation on the GPU: Survey and Improvements", "ACM TOG 33(3)", 2014;
     DEERING_1988 = "deering-1988": "M. Deering et al.", "The Triangle Processor and Normal Vector Shader", "SIGGRAPH", 1988;
     DEKKER_1971 = "dekker-1971": "T. J. Dekker", "A Floating-Point Technique for Extending the Available Precision", "Numerische Mathematik 18", 1971;
@@ -59,6 +62,8 @@ sources! {
     HAGEMANN_1975 = "hagemann-1975": "H.-J. Hagemann, W. Gudat, C. Kunz", "Optical Constants from the Far Infrared to the X-Ray Region: Mg, Al, Cu, Ag, Au, Bi, C, and Al2O3", "J. Opt. Soc. Am. 65", 1975;
     HAINES_1987 = "haines-1987": "E. Haines", "A Proposal for Standard Graphics Environments", "IEEE CG&A 7(11)", 1987;
     HAINES_2019 = "haines-2019": "E. Haines et al.", "Precision Improvements for Ray/Sphere Intersection", "Ray Tracing Gems, chapter 7", 2019;
+    HALTON_1960 = "halton-1960": "J. Halton", "On the Efficiency of Certain Quasi-Random Sequences of Points in Evaluating Multi-Dimensional Integrals", "Numerische Mathematik 2", 1960;
+    HAMMERSLEY_1960 = "hammersley-1960": "J. Hammersley", "Monte Carlo Methods for Solving Multivariable Problems", "Annals of the New York Academy of Sciences 86(3)", 1960;
     HECKBERT_1990 = "heckbert-1990": "P. Heckbert", "Adaptive Radiosity Textures for Bidirectional Ray Tracing", "SIGGRAPH", 1990;
     HEIDRICH_SEIDEL_1998 = "heidrich-seidel-1998": "W. Heidrich, H.-P. Seidel", "View-Independent Environment Maps", "Graphics Hardware", 1998;
     HEITZ_2014 = "heitz-2014": "E. Heitz", "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", "JCGT 3(2)", 2014;
@@ -152,6 +157,7 @@ sources! {
     TALBOT_2005 = "talbot-2005": "J. Talbot, D. Cline, P. Egbert", "Importance Resampling for Global Illumination", "EGSR", 2005;
     TURK_1994 = "turk-1994": "G. Turk", "The PLY Polygon File Format", "", 1994;
     UMENHOFFER_2007 = "umenhoffer-2007": "T. Umenhoffer, G. Patow, L. Szirmay-Kalos", "Robust Multiple Specular Reflections and Refractions", "GPU Gems 3", 2007;
+    VAN_OOSTEROM_STRACKEE_1983 = "van-oosterom-strackee-1983": "A. van Oosterom, J. Strackee", "The Solid Angle of a Plane Triangle", "IEEE Transactions on Biomedical Engineering 30(2)", 1983;
     VEACH_1997 = "veach-1997": "E. Veach", "Robust Monte Carlo Methods for Light Transport Simulation", "PhD thesis, Stanford University", 1997;
     WALD_2003 = "wald-2003": "I. Wald, C. Benthin, P. Slusallek", "Distributed Interactive Ray Tracing of Dynamic Scenes", "PVG", 2003;
     WALD_2004 = "wald-2004": "I. Wald", "Realtime Ray Tracing and Interactive Global Illumination", "PhD thesis, Saarland University", 2004;

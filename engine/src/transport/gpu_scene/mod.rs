@@ -334,6 +334,12 @@ impl GpuScene {
         kinds.area || kinds.punctual || kinds.environment
     }
 
+    /// Lights that light sampling chooses among: each triangle that emits, each point, spot and direction, and the environment.
+    pub(crate) fn light_count(&self) -> u32 {
+        (self.buffers.lights.buffer().bytes() / (u64::from(constants::LIGHT_QUARTERS) * size_of::<[u32; 4]>() as u64))
+            as u32
+    }
+
     /// True when some surface of positive area emits.
     pub fn has_area_lights(&self) -> bool {
         self.light_kinds.area

@@ -115,6 +115,7 @@ measures! {
     on_device "gather-places" impostors::gather_places;
     on_device "gather-table" impostors::gather_table;
     on_device "gather-terms" impostors::gather_terms;
+    on_device "imperfect-maps" preview::imperfect_maps;
     on_device "impostor-methods" impostors::impostor_methods;
     on_host "impostor-roots" impostors::impostor_roots;
     on_device "kd-caches" kd::kd_caches.of_any_scenes();
@@ -172,6 +173,7 @@ measures! {
     on_host "vpl-order" virtual_lights::vpl_order;
     on_device "vpl-potential" virtual_lights::vpl_potential;
     on_host "vpl-walks" virtual_lights::vpl_walks;
+    on_host "vpl-warp" preview::vpl_warp;
     on_device "walk-agreement" rendering::walk_agreement;
 }
 

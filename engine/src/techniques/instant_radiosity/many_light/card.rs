@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Interleaving, ManyLight, ManyLightSettings, Visibility};
+use super::{Interleaving, ManyLight, ManyLightSettings, Placement, Visibility};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::Caps;
 use crate::gpu::interface::ShaderInfo;
@@ -23,7 +23,8 @@ use crate::{Error, Result};
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Biased(
     "what the bound of the geometry term leaves out is not compensated; the filter averages the light of neighbouring pixels on a surface; \
-     visibility by maps errs at borders of shadows by their texels, and without any light goes through everything; \
+     visibility by maps errs at borders of shadows by their texels, by imperfect ones also by what their points miss or hang over, and without any light goes through \
+     everything; by reflective shadow maps a texel's middle stands for all of the texel; \
      silhouettes are the rasterizer's, off by parts of a pixel",
 );
 
@@ -49,7 +50,7 @@ const KERNELS: [&ShaderInfo; 13] = [
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "many-light",
-    summary: "many lights on a deferred frame: direct light and one reflection more, of virtual lights that are shared out among interleaved tiles, with shadow rays, shadow maps or neither",
+    summary: "many lights on a deferred frame: direct light and one reflection more, of virtual lights from walks or reflective shadow maps that are shared out among interleaved tiles, with shadow rays, shadow maps, imperfect ones or nothing",
     rows: &[ROWS],
     bias: BIAS,
     needs: NEEDS,
@@ -129,10 +130,12 @@ impl Technique for ManyLight {
             ("walk_rays", c.walks.rays),
             ("walks_escaped", c.walks.escaped),
             ("walks_absorbed", c.walks.absorbed),
+            ("views_of_lights", c.views),
             ("virtual_lights", c.lights),
             ("connections", c.connections),
             ("visibility_tests", c.visibility_tests),
             ("shadow_maps", c.maps),
+            ("splats", c.splats),
             ("passes", c.passes),
             ("bytes_between_passes", self.bytes()),
         ])
@@ -145,7 +148,7 @@ impl Technique for ManyLight {
             false => deferred_gather::INFO.name,
         };
         let mut all = skipped(&pipelines, shader, &SURFACE_FEATURES);
-        let lights = self.has_virtual_lights();
+        let (lights, discs) = (self.has_virtual_lights(), self.has_discs());
         let further = [
             (
                 !self.has_direct_light(),
@@ -153,14 +156,20 @@ impl Technique for ManyLight {
                 "nothing sends any, or the picture has none of it",
             ),
             (
-                !lights,
+                !lights && !discs,
                 "virtual lights",
                 "no light can be chosen, or the picture has nothing of theirs",
             ),
+            (discs, "virtual lights", "pixels gather from reflective shadow maps"),
             (
-                lights && settings.visibility != Visibility::Maps,
+                lights && matches!(settings.visibility, Visibility::None | Visibility::Rays),
                 "shadow maps of virtual lights",
                 "they were not asked for",
+            ),
+            (
+                lights && settings.placement == Placement::Walks,
+                "reflective shadow maps",
+                "virtual lights come from walks",
             ),
             (
                 lights && !settings.filters(),
@@ -224,7 +233,10 @@ const ROWS: &[Row] = &[
         sources: &[sources::VEACH_1997.at("9.2"), sources::SUN_2015.at("§4.9")],
         shaders: &["shaders/techniques/instant_radiosity/deferred_direct.comp"],
         bias: Some(Bias::Unbiased),
-        tests: &["tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers"],
+        tests: &[
+            "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers_through_any_camera",
+        ],
         settings: &["path_set"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/kernels.rs")
     },
@@ -272,10 +284,61 @@ const ROWS: &[Row] = &[
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/kernels.rs")
     },
     Row {
+        id: "SVO-P8",
+        name: "reflective shadow maps of points, spots and directions, and of points of lights with an area and directions of the environment, as virtual lights",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Light of a texel is where its middle is; a few primary virtual lights a frame stand for lights with an area and the environment.",
+        sources: &[
+            sources::DACHSBACHER_STAMMINGER_2005.whole(),
+            sources::KELLER_1997.whole(),
+            sources::SUN_2015.at("§4.7"),
+        ],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/rsm.glsl",
+            "shaders/techniques/instant_radiosity/rsm_emitters.comp",
+            "shaders/techniques/instant_radiosity/rsm_flux.comp",
+            "shaders/techniques/instant_radiosity/rsm_lights.comp",
+        ],
+        bias: Some(Bias::Consistent("a texel's middle stands for all of the texel")),
+        needs: NEEDS,
+        tests: &[
+            "tests/tests/instant_radiosity/many_light/reflective.rs::each_light_reflects_as_much",
+            "tests/tests/instant_radiosity/many_light/reflective.rs::powers_of_spots_and_of_parallel_light_are_closed_forms",
+            "tests/tests/instant_radiosity/many_light/reflective.rs::frames_of_reflective_maps_are_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/reflective.rs::even_sequences_have_less_noise",
+            "tests/tests/instant_radiosity/many_light/reflective.rs::black_maps_give_no_lights",
+            "tests/tests/instant_radiosity/many_light/reflective.rs::reflective_maps_are_drawn_for_no_others_and_shared_out_alike",
+        ],
+        settings: &["placement", "rsm_side", "rsm_sequence", "emitters"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/reflective.rs")
+    },
+    Row {
+        id: "SVO-G1",
+        name: "light gathered from texels in discs of reflective shadow maps, weighted by the inverse of their density or as published",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Light comes through everything; what lies beyond a disc, or beyond the edge of the view that it is in, is missing.",
+        sources: &[
+            sources::DACHSBACHER_STAMMINGER_2005.whole(),
+            sources::SUN_2015.at("§2.2.1"),
+        ],
+        shaders: &["shaders/techniques/instant_radiosity/rsm_gather.comp"],
+        bias: Some(Bias::Biased(
+            "visibility is left out, and light beyond a disc; the published weight is off by what light grows or falls over a disc",
+        )),
+        needs: NEEDS,
+        tests: &[
+            "tests/tests/instant_radiosity/many_light/discs.rs::discs_over_all_texels_bring_what_all_lights_do",
+            "tests/tests/instant_radiosity/many_light/discs.rs::discs_need_reflective_maps_and_no_lights",
+            "engine/src/raster/reflective.rs::discs_are_weighted_by_the_inverse_of_their_density",
+        ],
+        settings: &["gathering", "disc_samples", "disc_radius"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/discs.rs")
+    },
+    Row {
         id: "SVO-B0",
         name: "shadow maps of virtual lights, exact ones of all triangles",
         role: Role::PartOf("SVO-P12"),
-        limits: "An octahedron of all directions for each light, of which its surface hides one half; costs as lights times triangles.",
+        limits: "An octahedron of all directions for each light, of which its surface hides one half; costs as lights times triangles; contact shadows begin a texel's diagonal late.",
         sources: &[
             sources::ENGELHARDT_DACHSBACHER_2008.whole(),
             sources::SUN_2015.at("§1 and §6"),
@@ -285,15 +348,15 @@ const ROWS: &[Row] = &[
             "shaders/raster/omni_shadow_set.glsl",
         ],
         bias: Some(Bias::Biased(
-            "borders of shadows err by half a texel of a map, and small things as a whole",
+            "borders of shadows err by half a texel of a map, and small things as a whole; contact shadows begin late, and what is very near to a light casts none",
         )),
         needs: &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"],
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays",
             "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",
         ],
-        settings: &["visibility", "map_side"],
-        ..Row::of("engine/src/techniques/instant_radiosity/many_light/maps.rs")
+        settings: &["map_side"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/exact_maps.rs")
     },
 ];
 

@@ -5,11 +5,11 @@ use std::ops::Range;
 use glam::DVec2;
 
 use super::kernels::{Sight, seen_from};
-use super::maps::Maps;
-use super::renderer::ManyLight;
+use super::reflective::{LightView, Reflective};
+use super::renderer::{Indirect, LightSource, ManyLight};
 use crate::gpu::shaders::types::SeenFrom;
 use crate::gpu::{Access, Area, Recorder, Timings};
-use crate::raster::View;
+use crate::raster::{DrawPart, View};
 use crate::scene::camera_frame::CameraFrame;
 use crate::techniques::instant_radiosity::gather::SWEEPS_A_LIGHT;
 use crate::techniques::photon_mapping::Tracing;
@@ -23,6 +23,8 @@ pub(super) struct Frame {
     from: SeenFrom,
     /// Virtual lights that have landed.
     lights: u32,
+    /// Views that pixels gather from.
+    views: u32,
     /// What was drawn is visible to compute shaders.
     is_shown: bool,
     stage: Stage,
@@ -31,6 +33,17 @@ pub(super) struct Frame {
 /// What comes next.
 enum Stage {
     Walks(Box<Tracing>),
+    /// What reflective shadow maps are drawn from.
+    Emitters,
+    /// A part of the view of a light, of so many.
+    View(Box<LightViews>),
+    /// Virtual lights on so many views.
+    OnViews(u32),
+    /// Discs of that view, from that pixel on.
+    Discs {
+        view: u32,
+        pixel: u32,
+    },
     /// What is seen, from that part on.
     Draw(usize),
     /// Light without virtual lights, from that pixel on.
@@ -49,6 +62,14 @@ enum Stage {
     /// Back to the picture, from that pixel on.
     Merge(u32),
     Ended,
+}
+
+/// The views of the lights of a frame, and what of them comes next.
+struct LightViews {
+    all: Vec<LightView>,
+    next: usize,
+    parts: Vec<DrawPart>,
+    part: usize,
 }
 
 impl Frame {
@@ -78,13 +99,19 @@ impl ManyLight {
             self.parts = Some(seen.coverage.parts(&surfaces, views, size)?);
         }
         let stage = match &self.indirect {
-            Some(indirect) => Stage::Walks(Box::new(indirect.tracer.begin(self.done, None))),
+            Some(Indirect {
+                source: LightSource::Walks(tracer),
+                ..
+            }) => Stage::Walks(Box::new(tracer.begin(self.done, None))),
+            Some(_) => Stage::Emitters,
+            None if self.discs.is_some() => Stage::Emitters,
             None => self.first_drawing(),
         };
         Ok(Frame {
             view,
             from: seen_from(&camera, size),
             lights: 0,
+            views: 0,
             is_shown: false,
             stage,
         })
@@ -103,6 +130,10 @@ impl ManyLight {
         let stage = std::mem::replace(&mut frame.stage, Stage::Ended);
         let (timings, next) = match stage {
             Stage::Walks(tracing) => self.walk(frame, tracing)?,
+            Stage::Emitters => self.emit()?,
+            Stage::View(views) => self.draw_view(*views)?,
+            Stage::OnViews(views) => self.place_on_views(frame, views)?,
+            Stage::Discs { view, pixel } => self.gather_discs(frame, view, pixel)?,
             Stage::Draw(part) => self.draw(frame, part)?,
             Stage::Direct(pixel) => self.shade(frame, pixel)?,
             Stage::Maps { first, from } => self.draw_maps(frame, first, from)?,
@@ -124,25 +155,110 @@ impl ManyLight {
     }
 
     fn walk(&mut self, frame: &mut Frame, mut tracing: Box<Tracing>) -> Result<(Vec<Timings>, Stage)> {
-        let Some(indirect) = &mut self.indirect else {
+        let Some(LightSource::Walks(tracer)) = self.indirect.as_mut().map(|indirect| &mut indirect.source) else {
             return Ok((Vec::new(), self.first_drawing()));
         };
-        let all = indirect.tracer.advance(&mut tracing)?;
+        let all = tracer.advance(&mut tracing)?;
         let timings = tracing.take_timings();
         if !all {
             return Ok((timings, Stage::Walks(tracing)));
         }
         let traced = tracing.into_traced();
-        frame.lights = traced.records;
         self.counts.walks += traced.counts;
-        self.counts.lights += u64::from(traced.records);
-        if let Some(maps) = &mut indirect.maps {
-            maps.begin(&self.gpu, indirect.tracer.records(), traced.records)?;
+        Ok((timings, self.placed(frame, traced.records)?))
+    }
+
+    /// What comes behind the virtual lights of a frame.
+    fn placed(&mut self, frame: &mut Frame, lights: u32) -> Result<Stage> {
+        (frame.lights, self.placed) = (lights, lights);
+        self.counts.lights += u64::from(lights);
+        if let Some(Indirect {
+            source,
+            maps: Some(maps),
+            ..
+        }) = &mut self.indirect
+        {
+            maps.begin(&self.gpu, source.records(), lights)?;
         }
-        // Where all walks have left the scene, and nothing else is shown, nothing is drawn.
-        let is_dark = traced.records == 0 && self.direct.is_none();
-        let next = if is_dark { Stage::Merge(0) } else { self.first_drawing() };
-        Ok((timings, next))
+        // Where no light has landed, and nothing else is shown, nothing is drawn.
+        let is_dark = lights == 0 && self.direct.is_none();
+        Ok(if is_dark { Stage::Merge(0) } else { self.first_drawing() })
+    }
+
+    /// Reflective shadow maps, where virtual lights come from them.
+    fn reflective(&self) -> Option<&Reflective> {
+        match self.indirect.as_ref().map(|indirect| &indirect.source) {
+            Some(LightSource::Reflective(reflective)) => Some(reflective),
+            _ => self.discs.as_ref().map(|discs| &discs.reflective),
+        }
+    }
+
+    /// What the maps of a frame are drawn from, and the views of that.
+    fn emit(&mut self) -> Result<(Vec<Timings>, Stage)> {
+        let number = self.done;
+        let timings = self.submit(|own, recorder| match own.reflective() {
+            Some(reflective) => reflective.record_emitters(recorder, &own.scene, number),
+            None => Ok(()),
+        })?;
+        let Some(reflective) = self.reflective() else {
+            return Ok((timings, self.first_drawing()));
+        };
+        let all = reflective.views(&self.gpu, &self.scene.surfaces())?;
+        self.counts.views += all.len() as u64;
+        let views = LightViews {
+            all,
+            next: 0,
+            parts: Vec::new(),
+            part: 0,
+        };
+        Ok((timings, Stage::View(Box::new(views))))
+    }
+
+    /// A part of a view of a light.
+    fn draw_view(&mut self, mut views: LightViews) -> Result<(Vec<Timings>, Stage)> {
+        let (Some(reflective), Some(view)) = (self.reflective(), views.all.get(views.next).copied()) else {
+            return Ok((Vec::new(), Stage::OnViews(views.all.len() as u32)));
+        };
+        if views.parts.is_empty() {
+            let (surfaces, size) = (self.scene.surfaces(), [reflective.side(); 2]);
+            views.parts = reflective.coverage().parts(&surfaces, &[view.view], size)?;
+        }
+        let (number, part) = (views.next as u32, views.parts[views.part].clone());
+        let timings = self.submit(|own, recorder| match own.reflective() {
+            Some(reflective) => reflective.record_view(recorder, &own.scene, (number, &view), &part),
+            None => Ok(()),
+        })?;
+        views.part += 1;
+        if part.ends {
+            (views.next, views.part) = (views.next + 1, 0);
+            views.parts.clear();
+        }
+        Ok((timings, Stage::View(Box::new(views))))
+    }
+
+    /// Virtual lights on the views of a frame: none where those are black.
+    fn place_on_views(&mut self, frame: &mut Frame, views: u32) -> Result<(Vec<Timings>, Stage)> {
+        if self.discs.is_some() {
+            frame.views = views;
+            return Ok((Vec::new(), self.first_drawing()));
+        }
+        if views == 0 {
+            return Ok((Vec::new(), self.placed(frame, 0)?));
+        }
+        let number = self.done;
+        let timings = self.submit(|own, recorder| match own.reflective() {
+            Some(reflective) => reflective.record_lights(recorder, &own.scene, views, number),
+            None => Ok(()),
+        })?;
+        let Some(reflective) = self.reflective() else {
+            return Ok((timings, self.first_drawing()));
+        };
+        let lights = if reflective.total(&self.gpu)? > 0.0 {
+            reflective.lights()
+        } else {
+            0
+        };
+        Ok((timings, self.placed(frame, lights)?))
     }
 
     /// A part of what is seen, and behind the last one the split picture where there are lights.
@@ -205,8 +321,50 @@ impl ManyLight {
         Ok((timings, next))
     }
 
+    /// What the texels of a view bring to a part of the pixels.
+    fn gather_discs(&mut self, frame: &mut Frame, view: u32, first: u32) -> Result<(Vec<Timings>, Stage)> {
+        let (all, number) = (self.pixels(), self.done);
+        let at_once = self.discs.as_ref().map_or(all, |discs| discs.pixels);
+        let end = first.saturating_add(at_once).min(all);
+        let timings = self.submit(|own, recorder| {
+            let (Some(discs), Some(seen)) = (&own.discs, &own.seen) else {
+                return Ok(());
+            };
+            recorder.pass("many-light: discs", |pass| {
+                if !frame.is_shown {
+                    seen.show(pass);
+                }
+                // What the first view brings is added to direct light, or to nothing.
+                if view == 0 && first == 0 && own.direct.is_none() {
+                    pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_WRITE);
+                    pass.fill(own.radiance.view(), 0)?;
+                    pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+                }
+                let sight = Sight {
+                    scene: &own.scene,
+                    seen,
+                    from: frame.from,
+                };
+                discs.record(pass, &sight, (number, view), first..end, &own.radiance)
+            })
+        })?;
+        frame.is_shown = true;
+        let next = match (end < all, view + 1 < frame.views) {
+            (true, _) => Stage::Discs { view, pixel: end },
+            (false, true) => Stage::Discs {
+                view: view + 1,
+                pixel: 0,
+            },
+            (false, false) => Stage::Merge(0),
+        };
+        Ok((timings, next))
+    }
+
     /// What gathers the lights from one on: as many as have a map at the same time, or all.
     fn first_lights(&self, frame: &Frame, first: u32) -> Stage {
+        if frame.views > 0 {
+            return Stage::Discs { view: 0, pixel: 0 };
+        }
         let Some(indirect) = self.indirect.as_ref().filter(|_| first < frame.lights) else {
             return Stage::Merge(0);
         };
@@ -224,18 +382,25 @@ impl ManyLight {
     }
 
     fn draw_maps(&mut self, frame: &Frame, first: u32, from: [u32; 2]) -> Result<(Vec<Timings>, Stage)> {
-        let maps = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
+        let maps = self.indirect.as_mut().and_then(|indirect| indirect.maps.as_mut());
         let Some(maps) = maps else {
             return Ok((Vec::new(), Stage::Merge(0)));
         };
         let end = (first + maps.at_once()).min(frame.lights);
-        let (drawings, next) = maps.plan(&self.scene.surfaces(), from, end)?;
+        let points = u64::from(maps.points());
+        let (drawing, next) = maps.plan(&self.scene.surfaces(), from, end)?;
         let timings = self.submit(|own, recorder| {
             let maps = own.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
             let surfaces = own.scene.surfaces();
-            maps.map_or(Ok(()), |maps| maps.record(recorder, &surfaces, first, &drawings))
+            let Some((indirect, maps)) = own.indirect.as_ref().zip(maps) else {
+                return Ok(());
+            };
+            let lights = (indirect.source.records(), frame.lights);
+            maps.record(recorder, &surfaces, lights, first, &drawing)
         })?;
-        self.counts.maps += u64::from(next[0] - from[0]);
+        let drawn = u64::from(next[0] - from[0]);
+        self.counts.maps += drawn;
+        self.counts.splats += drawn * points;
         let next = if next[0] < end {
             Stage::Maps { first, from: next }
         } else {
@@ -264,8 +429,8 @@ impl ManyLight {
             let Some(indirect) = &own.indirect else {
                 return Ok(());
             };
-            let maps = indirect.maps.as_ref().map(Maps::maps);
-            let records = indirect.tracer.records();
+            let maps = indirect.maps.as_ref();
+            let records = indirect.source.records();
             recorder.pass("many-light: gather", |pass| {
                 indirect.split.record_sweeps(
                     pass,
@@ -318,7 +483,7 @@ impl ManyLight {
                     let split = &indirect.split;
                     split.record_merge(pass, seen, frame.lights, first..end, &own.radiance)
                 })?;
-            } else if own.direct.is_none() {
+            } else if own.direct.is_none() && frame.views == 0 {
                 recorder.pass("many-light: black", |pass| {
                     pass.fill(own.radiance.view(), 0)?;
                     pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);

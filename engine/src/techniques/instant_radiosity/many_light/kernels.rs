@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::interleave::Interleaving;
-use super::maps::Maps;
+use super::maps::{LAYOUT, Maps};
 use super::settings::{ManyLightSettings, Visibility};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::{BindingSet, SampledView};
@@ -19,7 +19,7 @@ use crate::gpu::{
     Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Image, Pass, PipelineInfo, SOFTWARE_LOOP_CAP, Sampler,
     SamplerDesc, TexelView, wide_counter,
 };
-use crate::raster::{Coverage, GBuffer, GBufferDesc, Layering, OmniShadowMaps, Output, Surfaces};
+use crate::raster::{Coverage, GBuffer, GBufferDesc, Layering, Output, Surfaces};
 use crate::scene::camera_frame::CameraFrame;
 use crate::techniques::Part;
 use crate::techniques::instant_radiosity::gather::{connections_at_once, lights_at_once};
@@ -83,11 +83,11 @@ impl Seen {
         })
     }
 
-    fn triangles(&self) -> Result<SampledView<'_>> {
+    pub fn triangles(&self) -> Result<SampledView<'_>> {
         self.view(Output::Triangle, Output::Triangle)
     }
 
-    fn weights(&self) -> Result<SampledView<'_>> {
+    pub fn weights(&self) -> Result<SampledView<'_>> {
         self.view(Output::Weights, Output::Weights)
     }
 }
@@ -242,7 +242,7 @@ impl Split {
         settings: &ManyLightSettings,
         size: [u32; 2],
         adds: bool,
-        maps: Option<&Maps>,
+        has_maps: bool,
     ) -> Result<Self> {
         let interleaving = Interleaving::new(size, settings.interleave);
         let places = interleaving.places();
@@ -263,7 +263,7 @@ impl Split {
             lights_at_once,
             visibility: settings.visibility.kind(),
             keeps_colors: settings.filters(),
-            shadow_kind: maps.map_or(0, |maps| maps.maps().desc().layout.kind()),
+            shadow_kind: if has_maps { LAYOUT.kind() } else { 0 },
             shadow_width: 0,
             index_quota,
             index_kind: traversal.kind(),
@@ -354,7 +354,7 @@ impl Split {
         scene: &GpuScene,
         from: SeenFrom,
         (records, lights): (&TexelView, u32),
-        (maps, mapped): (Option<&OmniShadowMaps>, Range<u32>),
+        (maps, mapped): (Option<&Maps>, Range<u32>),
         (places, sweeps): (Range<u32>, u32),
     ) -> Result<()> {
         let [lower, upper] = scene.bounds().map(|corner| corner.to_array());
@@ -370,7 +370,7 @@ impl Split {
             interleave: self.tiles,
             subsets: self.subsets,
             first_map: mapped.start,
-            map_side: maps.map_or(0, |maps| maps.desc().side as i32),
+            map_side: maps.map_or(0, |maps| maps.side() as i32),
         };
         let set = deferred_gather::Set0 {
             virtual_light_texels: records,
@@ -383,7 +383,7 @@ impl Split {
             OmniShadowSet {
                 shadow_distances: self.no_maps.view(),
             },
-            OmniShadowMaps::set,
+            Maps::set,
         );
         let (index, scene) = (scene.index_set(), scene.scene_set());
         let sets: [&dyn BindingSet<'_>; 4] = [&set, &index, &scene, &shadows];

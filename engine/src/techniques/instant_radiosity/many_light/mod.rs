@@ -2,9 +2,10 @@
 //!
 //! Sources: A. Keller, "Instant Radiosity", SIGGRAPH 1997; A. Keller and W. Heidrich, "Interleaved Sampling", EGWR 2001; B. Segovia et al., "Non-interleaved Deferred
 //! Shading of Interleaved Sample Patterns", Graphics Hardware 2006; S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR
-//! 2007; C. Sun, "Many-Light Real-Time Global Illumination using Sparse Voxel Octree", Master's thesis, WPI, 2015, §3.3 and §4.5 to §4.12.
+//! 2007; C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005; T. Ritschel et al., "Imperfect Shadow Maps for Efficient Computation of Indirect
+//! Illumination", SIGGRAPH Asia 2008; C. Sun, "Many-Light Real-Time Global Illumination using Sparse Voxel Octree", Master's thesis, WPI, 2015, §3.3 and §4.5 to §4.12.
 //!
-//! A frame is a sample of every pixel: walks from the lights leave a virtual light each where they first land; a G-buffer is rasterized; a kernel adds what is emitted and
+//! A frame is a sample of every pixel: walks from the lights, or points on reflective shadow maps of them, leave a virtual light each where they first land; a G-buffer is rasterized; a kernel adds what is emitted and
 //! what arrives directly, with two rays a pixel; the G-buffer is split into n × n tiles ([`Interleaving`]), each place gathers from its tile's subset of the virtual
 //! lights, and sums go back to their pixels, where a filter averages those of neighbours on the same surface.
 //!
@@ -15,7 +16,12 @@
 //! - *Bound.* Light over edges that are shorter than the bound of the geometry term allows is left out in part, and nothing compensates it.
 //! - *Filter.* The light of neighbours on the same surface is averaged, up to n/2 pixels away: contact shadows are as much softer, and of glossy surfaces so are highlights.
 //! - *Visibility.* `none` lets light through everything. `maps` errs at borders of shadows by half a texel of what the virtual light sees, and as a whole about what is
-//!   smaller than texels; light that a virtual light transmits through its own surface is in the shadow of that. `rays` adds no error.
+//!   smaller than texels; shadows begin a texel's diagonal off what casts them, and what is nearer to a light than 2⁻¹⁴ of the scene's reach casts none; light that a
+//!   virtual light transmits through its own surface is in the shadow of that. `imperfect` errs so, and by what its points miss or cover too much
+//!   ([`splat_atlas`](crate::raster::splat_atlas)), and has cut-outs opaque. `rays` adds no error.
+//! - *Placement.* By walks exact. By reflective shadow maps what a texel's middle meets stands for all of the texel, so that light ends a texel from where it should.
+//! - *Discs.* What is gathered from texels in discs comes through everything, and what lies beyond a disc or the view that it is in is missing; the published weight is off
+//!   by what the light falls or grows over a disc.
 //! - *Edges.* Rasterizers round corners to parts of a pixel (1/256 here): what is seen at a silhouette may be what lies behind, as far beside it, even where that is inside
 //!   of a closed body.
 //!
@@ -28,14 +34,19 @@
 //! settings or scene do not ask for costs no pass and no buffer.
 
 mod card;
+mod discs;
+mod exact_maps;
 mod frame;
+mod imperfect_maps;
 mod interleave;
 mod kernels;
 mod maps;
+mod records;
+mod reflective;
 mod renderer;
 mod settings;
 
 pub(in crate::techniques) use card::CARD;
 pub use interleave::Interleaving;
 pub use renderer::{ManyLight, ManyLightCounts};
-pub use settings::{ManyLightSettings, Visibility};
+pub use settings::{Gathering, ManyLightSettings, Placement, RsmSequence, Visibility};

@@ -3,19 +3,23 @@
 use std::sync::Arc;
 
 use super::card::refusals;
+use super::discs::Discs;
 use super::frame::Frame;
 use super::kernels::{Direct, Seen, Split};
 use super::maps::Maps;
-use super::settings::{ManyLightSettings, Visibility};
+use super::records::LightRecord;
+use super::reflective::Reflective;
+use super::settings::{Gathering, ManyLightSettings, Placement};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu, PipelineInfo};
+use crate::gpu::{Buffer, BufferDesc, Category, Gpu, PipelineInfo, TexelView};
 use crate::raster::DrawPart;
 use crate::scene::camera_frame::CameraFrame;
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
 use crate::techniques::FrameTarget;
 use crate::techniques::foresight::frame_fits;
+use crate::techniques::instant_radiosity::VirtualLight;
 use crate::techniques::instant_radiosity::append::LightAppend;
 use crate::techniques::photon_mapping::{PhotonCounts, PhotonPlan, PhotonTracer, Stored};
 use crate::transport::{GpuScene, PathSet};
@@ -32,6 +36,8 @@ pub struct ManyLightCounts {
     pub frames: u64,
     /// Walks from the lights.
     pub walks: PhotonCounts,
+    /// Views of lights that were drawn, of reflective shadow maps.
+    pub views: u64,
     /// Virtual lights of all frames.
     pub lights: u64,
     /// Pairs of a pixel and a virtual light.
@@ -40,6 +46,8 @@ pub struct ManyLightCounts {
     pub visibility_tests: u64,
     /// Shadow maps that were drawn.
     pub maps: u64,
+    /// Points that were splatted into imperfect ones.
+    pub splats: u64,
     /// Passes that were recorded, without those of walks.
     pub passes: u64,
 }
@@ -58,15 +66,57 @@ pub struct ManyLight {
     pub(super) parts: Option<Vec<DrawPart>>,
     pub(super) direct: Option<Direct>,
     pub(super) indirect: Option<Indirect>,
+    /// In place of virtual lights.
+    pub(super) discs: Option<Discs>,
     pub(super) frame: Option<Frame>,
     /// Frames on the film.
     pub(super) done: u32,
+    /// Virtual lights that a frame has placed last.
+    pub(super) placed: u32,
     pub(super) counts: ManyLightCounts,
+}
+
+/// Where virtual lights come from.
+pub(super) enum LightSource {
+    Walks(Box<PhotonTracer>),
+    Reflective(Box<Reflective>),
+}
+
+impl LightSource {
+    /// Their records.
+    pub fn records(&self) -> &TexelView {
+        match self {
+            Self::Walks(tracer) => tracer.records(),
+            Self::Reflective(reflective) => reflective.records(),
+        }
+    }
+
+    fn set_seed(&mut self, seed: u32) {
+        match self {
+            Self::Walks(tracer) => tracer.set_seed(seed),
+            Self::Reflective(reflective) => reflective.set_seed(seed),
+        }
+    }
+
+    fn pipelines(&self) -> Vec<PipelineInfo> {
+        match self {
+            Self::Walks(tracer) => tracer.pipelines(),
+            Self::Reflective(reflective) => reflective.pipelines(),
+        }
+    }
+
+    /// Beside the records.
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::Walks(_) => 0,
+            Self::Reflective(reflective) => reflective.bytes(),
+        }
+    }
 }
 
 /// Light of virtual lights.
 pub(super) struct Indirect {
-    pub(super) tracer: PhotonTracer,
+    pub(super) source: LightSource,
     pub(super) split: Split,
     pub(super) maps: Option<Maps>,
 }
@@ -103,8 +153,11 @@ impl ManyLight {
         let surfaces = scene.surfaces();
         let pixels = size[0] * size[1];
         let direct = shows_direct.then(|| Direct::new(gpu, &scene, &settings, pixels));
-        let indirect = shows_indirect.then(|| Indirect::new(gpu, &scene, &settings, size, shows_direct));
-        let (direct, indirect) = (direct.transpose()?, indirect.transpose()?);
+        let has_discs = settings.gathering != Gathering::Lights;
+        let indirect =
+            (shows_indirect && !has_discs).then(|| Indirect::new(gpu, &scene, &settings, size, shows_direct));
+        let discs = (shows_indirect && has_discs).then(|| Discs::new(gpu, &scene, &settings, pixels));
+        let (direct, indirect, discs) = (direct.transpose()?, indirect.transpose()?, discs.transpose()?);
         let filters = indirect.as_ref().is_some_and(|indirect| indirect.split.filters());
         let is_seen = shows_direct || shows_indirect;
         let seen = is_seen.then(|| Seen::new(gpu, &surfaces, size, filters)).transpose()?;
@@ -115,12 +168,14 @@ impl ManyLight {
             parts: None,
             direct,
             indirect,
+            discs,
             settings,
             camera: camera.clone(),
             film,
             radiance: gpu.buffer(&BufferDesc::storage("frame", bytes, Category::Film))?,
             frame: None,
             done: 0,
+            placed: 0,
             counts: ManyLightCounts::default(),
             scene,
         })
@@ -151,17 +206,39 @@ impl ManyLight {
         self.indirect.is_some()
     }
 
+    /// Whether pixels gather from reflective shadow maps instead.
+    pub fn has_discs(&self) -> bool {
+        self.discs.is_some()
+    }
+
     /// Whether there is light without them.
     pub fn has_direct_light(&self) -> bool {
         self.direct.is_some()
     }
 
-    /// Bytes of what lies between passes: G-buffer, split picture, shadow maps; not the records of virtual lights, 64 bytes each.
+    /// Bytes of what lies between passes: G-buffer, split picture, shadow maps, views of lights; not the records of virtual lights, 64 bytes each.
     pub fn bytes(&self) -> u64 {
         let seen = self.seen.as_ref().map_or(0, |seen| seen.gbuffer.bytes());
         let split = self.indirect.as_ref().map_or(0, |indirect| indirect.split.bytes());
         let maps = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
-        seen + split + maps.map_or(0, |maps| maps.maps().bytes())
+        let source = self.indirect.as_ref().map_or(0, |indirect| indirect.source.bytes());
+        let source = source + self.discs.as_ref().map_or(0, |discs| discs.reflective.bytes());
+        seen + split + source + maps.map_or(0, Maps::bytes)
+    }
+
+    /// The virtual lights that a frame has placed last, those of all together; none before the first ones.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn lights(&self) -> Result<Vec<VirtualLight>> {
+        let Some(indirect) = &self.indirect else {
+            return Ok(Vec::new());
+        };
+        let records = LightRecord::read(&self.gpu, indirect.source.records(), self.placed)?;
+        Ok(records
+            .iter()
+            .map(|record| record.light(self.settings.lights))
+            .collect())
     }
 
     /// The kernels with their specialization.
@@ -170,10 +247,11 @@ impl ManyLight {
         all.extend(self.seen.iter().flat_map(|seen| seen.gbuffer.pipelines()));
         all.extend(self.direct.iter().map(Direct::info));
         if let Some(indirect) = &self.indirect {
-            all.extend(indirect.tracer.pipelines());
+            all.extend(indirect.source.pipelines());
             all.extend(indirect.split.pipelines());
-            all.extend(indirect.maps.iter().flat_map(|maps| maps.maps().pipelines()));
+            all.extend(indirect.maps.iter().flat_map(Maps::pipelines));
         }
+        all.extend(self.discs.iter().flat_map(Discs::pipelines));
         all.extend(self.film.pipelines());
         all
     }
@@ -201,7 +279,10 @@ impl ManyLight {
             direct.set_seed(seed);
         }
         if let Some(indirect) = &mut self.indirect {
-            indirect.tracer.set_seed(seed);
+            indirect.source.set_seed(seed);
+        }
+        if let Some(discs) = &mut self.discs {
+            discs.set_seed(seed);
         }
         (self.done, self.frame) = (0, None);
         Ok(())
@@ -274,13 +355,18 @@ impl Indirect {
                 last_bounce: 0,
             },
         };
-        let append = Box::new(LightAppend::new(gpu, scene)?);
-        let maps = (settings.visibility == Visibility::Maps)
-            .then(|| Maps::new(gpu, &scene.surfaces(), settings))
-            .transpose()?;
+        let source = match settings.placement {
+            Placement::Walks => {
+                let append = Box::new(LightAppend::new(gpu, scene)?);
+                let tracer = PhotonTracer::new(gpu, Arc::clone(scene), plan, append)?;
+                LightSource::Walks(Box::new(tracer))
+            }
+            Placement::Rsm => LightSource::Reflective(Box::new(Reflective::new(gpu, scene, settings)?)),
+        };
+        let maps = Maps::new(gpu, &scene.surfaces(), settings)?;
         Ok(Self {
-            tracer: PhotonTracer::new(gpu, Arc::clone(scene), plan, append)?,
-            split: Split::new(gpu, scene, settings, size, adds, maps.as_ref())?,
+            source,
+            split: Split::new(gpu, scene, settings, size, adds, maps.is_some())?,
             maps,
         })
     }

@@ -18,6 +18,8 @@ pub enum Visibility {
     Rays,
     /// A shadow map for each light, which all triangles are drawn into.
     Maps,
+    /// An imperfect one for each light, which some points of all surfaces are drawn into, with holes filled.
+    Imperfect,
 }
 
 impl Visibility {
@@ -26,9 +28,47 @@ impl Visibility {
         match self {
             Self::None => VISIBILITY_NONE,
             Self::Rays => VISIBILITY_RAYS,
-            Self::Maps => VISIBILITY_MAPS,
+            // Look-ups are the same.
+            Self::Maps | Self::Imperfect => VISIBILITY_MAPS,
         }
     }
+}
+
+/// Where virtual lights come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Placement {
+    /// Walks from the lights.
+    #[default]
+    Walks,
+    /// Reflective shadow maps of the lights.
+    Rsm,
+}
+
+/// Points that choose texels of reflective shadow maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RsmSequence {
+    /// Of the bases 2, 3 and 5.
+    #[default]
+    Halton,
+    /// Their number over all, and the bases 2 and 3.
+    Hammersley,
+    /// Independent ones.
+    Random,
+}
+
+/// How pixels gather the light of virtual lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gathering {
+    /// From each of their tile.
+    #[default]
+    Lights,
+    /// From texels in a disc of each reflective shadow map, weighted by the inverse of their density; without visibility.
+    Disc,
+    /// So, weighted by the square of their distance from the disc's middle, as published.
+    DiscSquared,
 }
 
 /// Tiles along a side at most: windows of filters are as wide, in pixels.
@@ -37,11 +77,29 @@ const INTERLEAVE_MAX: u32 = 16;
 crate::settings! {
     /// Settings of frames of many lights.
     pub struct ManyLightSettings {
-        /// Walks from the lights for each frame, each of which leaves a virtual light where it first lands on a surface that is no mirror.
-        pub lights: u32 = 512, in 1..=1 << 16, unit "walks per frame";
-        /// What tells whether a point sees a virtual light: a shadow ray, a shadow map of each light, or nothing.
+        /// Virtual lights of each frame: as many walks from the lights, each of which leaves one where it first lands on a surface that is no mirror, or points on reflective
+        /// shadow maps.
+        pub lights: u32 = 512, in 1..=1 << 16, unit "lights per frame";
+        /// Where they come from: walks, or reflective shadow maps of the lights, drawn anew each frame, whose texels are chosen by what they reflect.
         ///
-        /// Of nothing pictures are too bright; maps err at borders of shadows.
+        /// Source: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005.
+        pub placement: Placement = Placement::Walks;
+        /// Along a side of each view of a light, of which a point light has six; a power of two.
+        pub rsm_side: u32 = 64, in 8..=1024, unit "texels";
+        /// Points that choose texels of reflective shadow maps; changes the noise only.
+        pub rsm_sequence: RsmSequence = RsmSequence::Halton;
+        /// Primary virtual lights of a frame that have reflective shadow maps, where a light has an area or surrounds the scene, or there are more lights; else each light has its own.
+        pub emitters: u32 = 4, in 1..=64, unit "lights";
+        /// How pixels gather: from virtual lights, or from texels in a disc of each view of a light, about where that shows the pixel's point, which brings light through everything and
+        /// leaves out what is beyond the disc.
+        pub gathering: Gathering = Gathering::Lights;
+        /// Samples of a disc.
+        pub disc_samples: u32 = 400, in 1..=4096, unit "texels";
+        /// Radius of discs over the width of a view.
+        pub disc_radius: f32 = 0.3, in 0.0..=2.0;
+        /// What tells whether a point sees a virtual light: a shadow ray, a shadow map of each light, an imperfect one of points of the surfaces, or nothing.
+        ///
+        /// Of nothing pictures are too bright; maps err at borders of shadows, imperfect ones also by what their points miss.
         pub visibility: Visibility = Visibility::Rays;
         /// Splits pictures into so many tiles along each side, each with another part of the virtual lights; 1 has all lights at all pixels. Changes the noise only.
         ///
@@ -61,6 +119,12 @@ crate::settings! {
         pub bound_value: f32 = 0.0, in 0.0.., unit "1/m² or m²";
         /// Along a side of the shadow map of a virtual light, an octahedron of directions of which one half sees something.
         pub map_side: u32 = 64, in 8..=1024, unit "texels";
+        /// Points of the surfaces in an imperfect shadow map.
+        ///
+        /// Source: T. Ritschel et al., "Imperfect Shadow Maps for Efficient Computation of Indirect Illumination", SIGGRAPH Asia 2008.
+        pub map_points: u32 = 4096, in 64..=1 << 16, unit "points";
+        /// Coarser levels that holes of an imperfect shadow map are filled from, each twice as far about a hole as the one before; as many as have whole texels.
+        pub map_fill: u32 = 2, in 0..=6, unit "levels";
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
         pub sampler: SamplerKind = SamplerKind::Sobol;
         /// Light paths that are shown: all, or those of fewer bounces.
@@ -78,16 +142,23 @@ crate::settings! {
         /// Virtual lights whose shadow maps are there at the same time, at most; 0 chooses by their size. Never changes the picture.
         pub maps_at_once: u32 = 0;
     }
-    check ManyLightSettings::shows_bounces_up_to_two;
+    check ManyLightSettings::are_sound;
 }
 
 impl ManyLightSettings {
-    fn shows_bounces_up_to_two(&self) -> Result<()> {
+    fn are_sound(&self) -> Result<()> {
         let (set, all) = (&self.path_set, PathSet::UP_TO_TWO_ROUGH);
         let range = PathSet::new(set.min_bounces(), set.max_bounces(), all.lobes()).ok();
         if set.is_empty() || !set.is_subset_of(&all) || range != Some(*set) {
             let cause = "is no range of bounces of bounces=0..2,lobes=diffuse+glossy";
             return Err(Error::setting("path_set", set, cause));
+        }
+        if self.gathering != Gathering::Lights && self.placement != Placement::Rsm {
+            let cause = "needs reflective shadow maps: placement = \"rsm\"";
+            return Err(Error::setting("gathering", format!("{:?}", self.gathering), cause));
+        }
+        if !self.rsm_side.is_power_of_two() {
+            return Err(Error::setting("rsm_side", self.rsm_side, "is no power of two"));
         }
         Ok(())
     }

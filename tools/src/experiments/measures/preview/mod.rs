@@ -1,5 +1,6 @@
 //! The raster preview: shadows of point lights, and light of maps that are drawn live.
 
+pub mod imperfect_maps;
 pub mod live_map_pictures;
 pub mod live_maps;
 mod live_stages;
@@ -8,3 +9,4 @@ pub mod reflection_maps;
 mod reflection_stages;
 pub mod shadow_maps;
 mod shadow_places;
+pub mod vpl_warp;
