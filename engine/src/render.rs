@@ -3,6 +3,8 @@
 //! [`render`] is the whole way in one call; [`Renderer`] keeps a scene on the device for several pictures, and [`Rendering`] refines one
 //! step by step, so that a host can show progress, stop at any time and keep what is there.
 
+pub mod spectral;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -718,7 +718,17 @@ fn the_reflection_preview_refuses_what_it_cannot_show() {
     }
 }
 
-/// The numbers that the mirror room prints: by how much each picture differs from that by rays.
+/// The number behind the first ` by ` of the line that begins with these words.
+fn printed(text: &str, name: &str) -> f32 {
+    let line = text.lines().find(|line| line.starts_with(name));
+    let line = line.unwrap_or_else(|| panic!("no line of {name:?}: {text}"));
+    let number = line.split(" by ").nth(1).and_then(|rest| rest.split(' ').next());
+    number
+        .and_then(|number| number.parse().ok())
+        .unwrap_or_else(|| panic!("no number: {line}"))
+}
+
+/// The mirror room prints by how much each picture differs from that by rays.
 #[test]
 fn the_mirror_room_comes_nearer_to_rays_with_distances() {
     let folder = tempfile::tempdir().unwrap();
@@ -728,16 +738,36 @@ fn the_mirror_room_comes_nearer_to_rays_with_distances() {
     let arguments = [&[path.to_str().unwrap()][..], &small, &scene].concat();
     let output = run(env!("CARGO_BIN_EXE_mirror_room"), &arguments);
     let text = said(&output);
-    let percent = |name: &str| -> f32 {
-        let line = text.lines().find(|line| line.starts_with(name));
-        let line = line.unwrap_or_else(|| panic!("no line of {name:?}: {text}"));
-        let number = line.split(" by ").nth(1).and_then(|rest| rest.split(' ').next());
-        number
-            .and_then(|number| number.parse().ok())
-            .unwrap_or_else(|| panic!("no number: {line}"))
-    };
-    let [alone, step, search] = ["the map alone", "one step", "the search"].map(percent);
+    let [alone, step, search] = ["the map alone", "one step", "the search"].map(|name| printed(&text, name));
     assert!(step < 0.7 * alone && search < 0.7 * alone, "{text}");
     let picture = open(&path);
     assert_eq!(picture.dimensions(), (128, 32));
+}
+
+/// Schlick's curve without k loses the metals' colours, the compensated one is about as near as the exact factor, and three channels are not bins of wavelengths.
+#[test]
+fn metals_lose_their_colours_by_schlicks_curve() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("metals.png");
+    let small = ["--size", "48x48", "--spp", "4", "--bins", "8"];
+    let arguments = [&[path.to_str().unwrap()][..], &small].concat();
+    let output = run(env!("CARGO_BIN_EXE_metals"), &arguments);
+    let text = said(&output);
+    let [schlick, compensated, exact] = ["schlick", "compensated", "exact"].map(|name| printed(&text, name));
+    assert!(schlick > 5.0 * exact && compensated < 1.5 * exact, "{text}");
+    assert!(exact > 0.05 && exact < 3.0, "{text}");
+    let picture = open(&path);
+    assert_eq!(picture.dimensions(), (192, 48));
+    // Copper is in the middle, and warm by the exact factor; most rings are dark at the left.
+    let middle = |column: f32| mean(&picture, [(column + 0.4) / 4.0, (column + 0.6) / 4.0], [0.4, 0.6]);
+    for color in [middle(2.0), middle(3.0)] {
+        assert!(color[0] > 1.05 * color[2], "{color:?}");
+    }
+    let whole = |column: f32| {
+        mean(&picture, [column / 4.0, (column + 1.0) / 4.0], [0.0, 1.0])
+            .iter()
+            .sum::<f32>()
+    };
+    let [left, exact] = [0.0, 2.0].map(whole);
+    assert!(left < 0.97 * exact, "{left} {exact}");
 }

@@ -4,6 +4,7 @@
 //! f64 test alone.
 
 use clerestory::accel::bvh2::{Bvh2, Bvh2Settings, Traversal};
+use clerestory::accel::yardstick::ray_engine::RayEngine;
 use clerestory::accel::{FINISHED, Hit, Ray, RayIndex, TraversalCounters};
 use clerestory::gpu::shaders::accel::trace_rays;
 use clerestory::gpu::shaders::sets::IndexSet;
@@ -214,5 +215,43 @@ fn kernels_are_their_twins_on_hard_cases() {
             };
             check(gpu, &set.what, &set.triangles, &set.rays, quotas);
         }
+    });
+}
+
+/// A pass for each triangle, and the nearest kept: the hits of the host's twin to the bit, and the distances that an index finds.
+#[test]
+fn the_ray_engine_finds_what_indexes_find() {
+    with_gpu(|gpu| {
+        let mut random = Random(11);
+        let mut point = |scale: f32| scale * (2.0 * Vec3::from_array([0; 3].map(|_: i32| random.unit())) - 1.0);
+        // More than are submitted together.
+        let triangles: Vec<[Vec3; 3]> = (0..300)
+            .map(|_| {
+                let middle = point(2.0);
+                [0; 3].map(|_: i32| middle + point(0.3))
+            })
+            .collect();
+        let mut rays: Vec<Ray> = (0..1000).map(|_| Ray::new(point(3.0), point(1.0))).collect();
+        rays[7].t_max = 0.5;
+        rays[8].direction = [0.0; 3];
+        rays[9].origin[1] = f32::NAN;
+        let engine = RayEngine::new(gpu).unwrap();
+        let (found, timings) = engine.trace(&triangles, &rays).unwrap();
+        assert_eq!(timings.len(), 2);
+        let index = Bvh2::build(&triangles, &Bvh2Settings::default()).unwrap();
+        let mut hits = 0;
+        for (ray, found) in rays.iter().zip(&found) {
+            let (twin, by_index) = (RayEngine::on_host(&triangles, ray), index.closest_hit(ray));
+            assert_eq!(twin.is_hit(), by_index.is_hit());
+            assert_eq!(twin.t.to_bits(), by_index.t.to_bits(), "{ray:?}");
+            if gpu.caps().kind == DeviceKind::Cpu {
+                assert_eq!(hit_bits(found), hit_bits(&twin), "{ray:?}");
+            }
+            hits += u32::from(twin.is_hit());
+        }
+        assert!((200..900).contains(&hits), "{hits}");
+        let all_miss = engine.trace(&[], &rays).unwrap().0;
+        assert!(all_miss.iter().all(|hit| !hit.is_hit()));
+        assert!(engine.trace(&triangles, &[]).unwrap().0.is_empty());
     });
 }

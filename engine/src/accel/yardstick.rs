@@ -9,6 +9,7 @@
 //! | [`split_list_hierarchy`], [`clustered_hierarchy`]: the same trees, built in other ways | [`merged_hierarchy`](super::photon_map::merge::merged_hierarchy) |
 //! | [`volume_sweep_tree`]: how good such a tree can be for points | the same |
 //! | [`area_sweep_tree`]: how good a tree can be for rays | [`Bvh2`](super::bvh2::Bvh2) |
+//! | [`RayEngine`](ray_engine::RayEngine): rays without an index | the same |
 //!
 //! Trees over points stand beside the compact map's queries by points: [`left_balanced`] and [`voxel_volume`], with what they share in
 //! [`point_tree`].
@@ -18,6 +19,7 @@
 
 pub mod left_balanced;
 pub mod point_tree;
+pub mod ray_engine;
 pub mod voxel_volume;
 
 pub use super::kd::shifted_restart::{LeafSequence, ShiftedRestart, leaves_by_stack};

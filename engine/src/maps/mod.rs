@@ -35,6 +35,7 @@ pub mod directional_map;
 mod disc;
 pub mod equal_area;
 pub mod gather;
+pub mod harmonics;
 mod image;
 pub mod impostor;
 pub mod irradiance;

@@ -122,6 +122,31 @@ impl OmniShadowDesc {
     pub fn texels(&self) -> u64 {
         u64::from(self.layout.layers()) * u64::from(self.side) * u64::from(self.side)
     }
+
+    /// Refuses what [`OmniShadowMaps::new`] does before it allocates anything; gives the bytes of all maps.
+    pub(crate) fn check(&self, gpu: &Gpu) -> Result<u64> {
+        if self.side == 0 || self.maps == 0 {
+            let value = format!("{} of side {}", self.maps, self.side);
+            return Err(Error::setting("shadow maps", value, "are none"));
+        }
+        if self.maps > SHADOW_MAPS_MAX {
+            let cause = format!("are more than {SHADOW_MAPS_MAX}, of which each takes two passes");
+            return Err(Error::setting("shadow maps", self.maps, cause));
+        }
+        let bytes = (self.texels())
+            .saturating_mul(u64::from(self.maps))
+            .saturating_mul(size_of::<f32>() as u64);
+        let limit = gpu.caps().max_storage_buffer_range;
+        if bytes > limit {
+            return Err(Error::LimitExceeded {
+                name: "shadow maps".into(),
+                value: bytes,
+                limit_name: "maxStorageBufferRange",
+                limit,
+            });
+        }
+        Ok(bytes)
+    }
 }
 
 /// Width of a filter at most, texels: wider ones blur more than what they are wrong by, and cost its square.
@@ -175,27 +200,7 @@ impl OmniShadowMaps {
     /// [`Error::Setting`] for no texels, or maps other than 1 to [`SHADOW_MAPS_MAX`] in number; [`Error::LimitExceeded`] for more than a storage buffer or an image holds;
     /// [`Error::MissingFeature`] for octahedra where clip distances are missing; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, desc: OmniShadowDesc) -> Result<Self> {
-        if desc.side == 0 || desc.maps == 0 {
-            let value = format!("{} of side {}", desc.maps, desc.side);
-            return Err(Error::setting("shadow maps", value, "are none"));
-        }
-        if desc.maps > SHADOW_MAPS_MAX {
-            let cause = format!("are more than {SHADOW_MAPS_MAX}, of which each takes two passes");
-            return Err(Error::setting("shadow maps", desc.maps, cause));
-        }
-        let bytes = desc
-            .texels()
-            .saturating_mul(u64::from(desc.maps))
-            .saturating_mul(size_of::<f32>() as u64);
-        let limit = gpu.caps().max_storage_buffer_range;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "shadow maps".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        let bytes = desc.check(gpu)?;
         let gbuffer = GBuffer::new(
             gpu,
             surfaces,

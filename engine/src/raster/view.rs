@@ -21,6 +21,9 @@ use crate::{Error, Result};
 /// The near plane's share of the scene's reach. Clipping there moves what it cuts by 2⁻²⁴ / 2⁻¹⁴ of half the picture at most.
 const NEAR: f32 = 1.0 / 16_384.0;
 
+/// How near to the end of depths oblique near planes let infinity come: what is left is for rounding.
+const OBLIQUE: f64 = 1.0 - 1.0 / 1024.0;
+
 /// How points come to the pixels of an area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
@@ -129,6 +132,36 @@ impl View {
         self
     }
 
+    /// The same without what lies behind a plane: `normal`, a unit vector, points to its front, and the view's origin is `height` behind it, metres. Depths go from 1 at the plane towards
+    /// infinity, in their order along each ray, with a step of 2⁻²⁴ everywhere; rays and pixels are the same. What is nearer to the plane than 2⁻¹⁴ of `reach`, the distance to the farthest surface, is cut off, too.
+    ///
+    /// Source: E. Lengyel, "Oblique View Frustum Depth Projection and Clipping", Journal of Game Development 1(2), 2005.
+    pub(crate) fn cut_by(mut self, reach: f32, normal: Vec3, height: f32) -> Self {
+        let r = &mut self.record;
+        let normal = normal.as_dvec3();
+        let behind = f64::from(height) + f64::from(reach * NEAR);
+        let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        // Depth is w less so much of the distance before the plane that it is never below 0.
+        let (w, scale) = if r.parallel != 0 {
+            (
+                glam::DVec4::new(0.0, 0.0, 0.0, 1.0),
+                1.0 / f64::from((2.0 * reach).max(f32::MIN_POSITIVE)),
+            )
+        } else {
+            let corner = |x: f64, y: f64| normal.dot(vector(r.forward) + x * vector(r.right) + y * vector(r.down));
+            let steepest = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+                .into_iter()
+                .fold(0.0, |steepest: f64, (x, y)| steepest.max(corner(x, y)));
+            let [x, y, z, _] = r.w.map(f64::from);
+            // A picture that looks away from the plane sees nothing, at whatever scale.
+            let scale = if steepest > 0.0 { OBLIQUE / steepest } else { 1.0 };
+            (glam::DVec4::new(x, y, z, 0.0), scale)
+        };
+        let row = w - scale * normal.extend(-behind);
+        r.z = row.as_vec4().to_array();
+        self
+    }
+
     /// The near plane that [`View::of_camera`] takes from here: 2⁻¹⁴ of the distance to the farthest surface, metres.
     pub fn near_plane(origin: Vec3, surfaces: &Surfaces<'_>) -> f32 {
         surfaces.reach(origin) * NEAR
@@ -225,5 +258,59 @@ impl View {
             let [x, y, z, constant] = row.map(f64::from);
             DVec3::new(x, y, z).dot(from) + constant
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oblique_near_planes_keep_pixels_and_the_order_of_depths() {
+        const REACH: f32 = 20.0;
+        let rows = [
+            DVec3::new(1.1, 0.1, 0.0),
+            DVec3::new(0.0, -0.9, 0.2),
+            DVec3::new(0.1, 0.2, 0.97),
+        ];
+        let origin = Vec3::new(0.3, -0.2, 1.0);
+        let area = Area::whole([64, 48]);
+        let normal = Vec3::new(0.2, -0.1, 0.9).normalize();
+        let height = 2.0;
+        let central = View::central(origin, rows, 0.01, area).expect("view");
+        let mut parallel = central;
+        parallel.record.z = [0.0; 4];
+        parallel.record.w = [0.0, 0.0, 0.0, 1.0];
+        parallel.record.parallel = 1;
+        for view in [central, parallel] {
+            let cut = view.cut_by(REACH, normal, height);
+            assert_eq!(cut.ray(10.5, 20.5), view.ray(10.5, 20.5));
+            let mut seen = [0; 2];
+            for x in 0..8 {
+                for y in 0..6 {
+                    let ray = view.ray(8.0 * x as f32 + 4.0, 8.0 * y as f32 + 4.0);
+                    let mut last = f64::INFINITY;
+                    for step in 1..60 {
+                        let t = 0.25 * f64::from(step);
+                        let [from, along] = [ray.origin, ray.direction].map(|v| Vec3::from_array(v).as_dvec3());
+                        let point = from + t * along;
+                        if f64::from(REACH) < point.distance(origin.as_dvec3()) {
+                            break;
+                        }
+                        let before = normal.as_dvec3().dot(point - origin.as_dvec3()) - f64::from(height);
+                        let [.., z, w] = cut.project(point);
+                        assert_eq!(cut.project(point)[..2], view.project(point)[..2]);
+                        assert!(z / w < last, "depths fall along rays");
+                        last = z / w;
+                        if before.abs() > 2.0 * f64::from(REACH * NEAR) {
+                            assert_eq!(z <= w, before > 0.0, "{before}");
+                            seen[usize::from(before > 0.0)] += 1;
+                        }
+                        assert!(z >= 0.0 || before < 0.0, "nothing is too far");
+                    }
+                }
+            }
+            assert!(seen.into_iter().all(|count| count > 100), "{seen:?}");
+        }
     }
 }

@@ -37,7 +37,7 @@ struct ReflectionRecord {
     vec3 found;
 };
 
-// Octahedron of directions, row by row without a border.
+// Octahedron of directions, row by row without a border; layer of surfaces by layer.
 layout(set = 3, binding = 0, scalar) restrict readonly buffer MapRadiance { vec3 map_radiance[]; };
 layout(set = 3, binding = 1, scalar) restrict buffer ReflectionCounters {
     uint reflections;
@@ -51,22 +51,22 @@ const uint REFLECTION_DONE = 0xFFFFFFFCu;
 // Loop iterations that a place counts as, beside its steps.
 const uint REFLECTION_ITERATIONS = 4u;
 
-vec3 map_texel(ivec2 p) {
+vec3 map_texel(uint layer, ivec2 p) {
     ivec2 size = ivec2(int(push.side));
     if (min(p.x, p.y) < 0 || any(greaterThanEqual(p, size))) {
         p = octahedron_wrap(p, size);
     }
-    return map_radiance[p.y * size.x + p.x];
+    return map_radiance[(int(layer) * size.y + p.y) * size.x + p.x];
 }
 
-// Radiance from a unit direction, bilinear over the octahedron's edges.
-vec3 map_look_up(vec3 d) {
+// Radiance of a layer from a unit direction, bilinear over the octahedron's edges.
+vec3 map_look_up(uint layer, vec3 d) {
     vec2 place = (0.5 * octahedron_encode(d) + 0.5) * float(push.side) - 0.5;
     vec2 corner = floor(place);
     vec2 part = place - corner;
     ivec2 p = ivec2(corner);
-    vec3 upper = mix(map_texel(p), map_texel(p + ivec2(1, 0)), part.x);
-    vec3 lower = mix(map_texel(p + ivec2(0, 1)), map_texel(p + ivec2(1, 1)), part.x);
+    vec3 upper = mix(map_texel(layer, p), map_texel(layer, p + ivec2(1, 0)), part.x);
+    vec3 lower = mix(map_texel(layer, p + ivec2(0, 1)), map_texel(layer, p + ivec2(1, 1)), part.x);
     return mix(upper, lower, part.y);
 }
 
@@ -104,7 +104,7 @@ void reflect_at(uint slot, uint place) {
     ImpostorHit found = reflected_hit(x, r);
     // A ray that is none finds nothing.
     if (dot(found.direction, found.direction) > 0.0) {
-        walk_gathered[slot].radiance += path.throughput * mirror.weight * map_look_up(found.direction);
+        walk_gathered[slot].radiance += path.throughput * mirror.weight * map_look_up(IMPOSTOR_LAYERS > 1u ? found.layer : 0u, found.direction);
     }
     bool searches = !REFLECTS_IN_BOX && IMPOSTOR_METHOD != IMPOSTOR_CLASSICAL;
     atomicAdd(reflection_counters.reflections, 1u);
@@ -133,5 +133,5 @@ void main() {
     walk_resume[place] = REFLECTION_DONE;
     reflect_at(load_slot(place), place);
     bool marches = IMPOSTOR_METHOD == IMPOSTOR_MARCH;
-    count_work(REFLECTION_ITERATIONS + IMPOSTOR_STEPS + (marches ? IMPOSTOR_BISECTIONS : 0u), WORK_UNIT);
+    count_work(REFLECTION_ITERATIONS + IMPOSTOR_LAYERS * (IMPOSTOR_STEPS + (marches ? IMPOSTOR_BISECTIONS : 0u)), WORK_UNIT);
 }

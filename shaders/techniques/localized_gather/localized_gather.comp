@@ -1,6 +1,7 @@
 #version 460
 // Indirect light where eye paths first arrive at rough surfaces, from the lights that a coarse map's texels stand for: one place an invocation. What cosine-shaped lobes
-// reflect is their albedo times a lobe of exponent 1 about the normal, what microfacets do is theirs times a narrower one about the mirrored direction.
+// reflect is their albedo times a lobe of exponent 1 about the normal, what microfacets do is theirs times a narrower one about the mirrored direction, of lights before the
+// surface alone, scaled to the whole lobe.
 //
 // Sources, bias and guarantees: techniques/localized_gather/mod.rs; maps/gather/mod.rs. Deterministic: sums in the order of lights, in blocks.
 #extension GL_GOOGLE_include_directive : require
@@ -63,17 +64,29 @@ void gather_at(uint slot, uint place) {
     bool is_shiny = shine != vec3(0.0);
     vec3 x = a.surface.point.position - push.place;
     vec3 sum = vec3(0.0);
+    // Light of the narrower lobe; its weight of all lights and of those before the surface.
+    vec3 shining = vec3(0.0);
+    vec2 weights = vec2(0.0);
     for (uint first = 0u; first < push.lights; first += GATHER_BLOCK) {
         vec3 block = vec3(0.0);
+        vec3 shining_block = vec3(0.0);
+        vec2 weights_block = vec2(0.0);
         for (uint k = first; k < min(first + GATHER_BLOCK, push.lights); ++k) {
             GatherRecord light = gather_lights[k];
-            vec3 reflected = cosine * gather_term(light, x, frame.z, 1.0, GATHER_CONES);
+            block += cosine * gather_term(light, x, frame.z, 1.0, GATHER_CONES) * light.radiance;
             if (is_shiny) {
-                reflected += shine * gather_term(light, x, mirrored_way, exponent, false);
+                float weight = gather_term(light, x, mirrored_way, exponent, false);
+                float before = dot(frame.z, light.position - x) > 0.0 ? weight : 0.0;
+                shining_block += before * light.radiance;
+                weights_block += vec2(weight, before);
             }
-            block += reflected * light.radiance;
         }
         sum += block;
+        shining += shining_block;
+        weights += weights_block;
+    }
+    if (weights.y > 0.0) {
+        sum += shine * shining * (weights.x / weights.y);
     }
     walk_gathered[slot].radiance += path.throughput * sum;
     atomicAdd(localized_counters.gathers, 1u);

@@ -192,3 +192,78 @@ fn prints_its_hash_when_asked() {
         println!("hash {hash:016x}");
     });
 }
+
+/// Maps that are drawn trace nothing; maps by rays count what they trace, and name what traces it. Shadow maps that do not fit are no reason to fail where rays will do.
+#[test]
+fn maps_tell_what_they_took() {
+    with_gpu(|gpu| {
+        let mut scene = room_with(mirror(), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut scene, 1.0);
+        let small = |settings: Value| {
+            let mut all = json!({"side": 32, "capture_samples": 2});
+            for (name, value) in settings.as_object().into_iter().flatten() {
+                all[name] = value.clone();
+            }
+            all
+        };
+        let names = |rendered: &Rendered| -> Vec<String> {
+            rendered
+                .report
+                .pipelines
+                .iter()
+                .map(|pipeline| pipeline.shader.to_owned())
+                .collect()
+        };
+        for technique in ["impostor", "localized-gather"] {
+            let renderer = renderer(gpu, &scene);
+            let of = |settings: Value| rendered(&renderer, technique, 8, 1, small(settings));
+            let drawn = of(Value::Null);
+            let counters = &drawn.report.counters;
+            assert_eq!([counters["map_paths"], counters["map_rays"]], [0; 2], "{technique}");
+            assert!(
+                names(&drawn).iter().any(|name| name.contains("preview_shade")),
+                "{:?}",
+                names(&drawn)
+            );
+            let traced = of(json!({"capture": "rays"}));
+            let counters = &traced.report.counters;
+            assert_eq!(counters["map_paths"], 2 * 32 * 32, "{technique}");
+            assert!(counters["map_rays"] > counters["map_paths"], "{technique}");
+            assert_eq!(counters["map_non_finite"], 0, "{technique}");
+            assert!(
+                names(&traced).iter().any(|name| name.contains("path_directions")),
+                "{:?}",
+                names(&traced)
+            );
+            let has_shadows = |rendered: &Rendered| {
+                !rendered
+                    .report
+                    .skipped
+                    .iter()
+                    .any(|skipped| skipped.what == "shadow maps")
+            };
+            assert!(has_shadows(&drawn), "{technique}");
+            assert!(technique != "impostor" || !has_shadows(&traced));
+
+            // Five of a GiB each are beyond what 32 bits count.
+            let mut lit = scene.clone();
+            (0..4).for_each(|_| lamp(&mut lit, 1.0));
+            let lit = super::renderer(gpu, &lit);
+            let fallen_back = rendered(&lit, technique, 8, 1, small(json!({"shadow_side": 16384})));
+            assert_eq!(fallen_back.report.counters["map_paths"], 2 * 32 * 32, "{technique}");
+            assert!(technique != "impostor" || !has_shadows(&fallen_back));
+            let options = RenderOptions {
+                technique: Some(technique.into()),
+                size: [8; 2],
+                spp: 1,
+                settings: small(json!({"shadow_side": 16384, "capture": "raster"})).into(),
+                ..RenderOptions::default()
+            };
+            let error = lit.render(&options).expect_err(technique);
+            assert!(
+                matches!(&error, Error::LimitExceeded { name, .. } if name == "shadow maps"),
+                "{error}"
+            );
+        }
+    });
+}

@@ -114,3 +114,99 @@ fn emission_is_never_counted_twice() {
         assert_eq!(layer(&found, "radiance"), layer(&direct, "radiance"));
     });
 }
+
+/// A plate of a rough metal, half a width of 0.15 about `centre`, seen 12 degrees above its plane; all pixels see it, from above.
+fn plate(scene: &mut Scene, centre: Vec3) -> u32 {
+    let metal = scene.add_material(Material {
+        roughness: 0.6,
+        ..Material::mirror("metal", Vec3::splat(0.9))
+    });
+    let at = |x: f32, z: f32| centre + 0.15 * Vec3::new(x, 0.0, z);
+    scene.place(quad(
+        "plate",
+        metal,
+        [at(-1.0, 1.0), at(1.0, 1.0), at(1.0, -1.0), at(-1.0, -1.0)],
+    ));
+    let middle = centre.as_dvec3();
+    let (sine, cosine) = 12f64.to_radians().sin_cos();
+    scene.cameras.push(Camera::look_at(
+        "main",
+        middle + 0.4 * DVec3::new(-cosine, sine, 0.0),
+        middle,
+        DVec3::Y,
+        2.0 * 0.03f32.atan(),
+    ));
+    scene.instances.len() as u32 - 1
+}
+
+/// In a round room that is lit from its middle all walls are equally bright: what a plate reflects is its albedo times that, also where a half of its lobe lies below it.
+#[test]
+fn even_surroundings_keep_their_albedo_at_grazing_views() {
+    with_gpu(|gpu| {
+        let mut scene = Scene::default();
+        let wall = scene.add_material(Material::lambert("wall", Vec3::splat(0.8)));
+        scene.place(sphere(wall, Vec3::ZERO, 1.0, 96));
+        scene.add_light(
+            "lamp",
+            LightKind::Point {
+                position: Vec3::ZERO,
+                intensity: Vec3::splat(2.0),
+            },
+        );
+        let object = plate(&mut scene, Vec3::new(0.0, -0.5, 0.0));
+        let renderer = renderer(gpu, &scene);
+        let mean = |technique: &str, spp: u32, settings: Value| -> f64 {
+            let found = rendered(&renderer, technique, 8, spp, settings);
+            let values = layer(&found, "radiance");
+            values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len() as f64
+        };
+        let direct = mean("path", 64, json!({"path_set": "bounces=0..1"}));
+        let expected = mean("path", 1024, json!({"path_set": "LE|L.E|L.[DG]E"})) - direct;
+        let found = mean(
+            "localized-gather",
+            64,
+            json!({"object": object, "place": [0.0, -0.45, 0.0]}),
+        ) - direct;
+        println!("{found} {expected}");
+        // The plate's shadow is below it, and walls are flat between the sphere's corners.
+        assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected}");
+    });
+}
+
+/// A lit wall below the plane of a plate of metal shines on its lower side alone.
+#[test]
+fn what_is_behind_a_surface_does_not_shine_on_it() {
+    with_gpu(|gpu| {
+        let picture = |side: f32, technique: &str| -> (f32, u64) {
+            let mut scene = Scene::default();
+            let wall = scene.add_material(Material::lambert("wall", Vec3::splat(0.8)));
+            let at = |x: f32, z: f32| Vec3::new(x, 0.6 * side, z);
+            scene.place(quad(
+                "wall",
+                wall,
+                [at(0.1, 0.6), at(1.3, 0.6), at(1.3, -0.6), at(0.1, -0.6)],
+            ));
+            scene.add_light(
+                "lamp",
+                LightKind::Point {
+                    position: Vec3::new(0.7, 0.3 * side, 0.0),
+                    intensity: Vec3::ONE,
+                },
+            );
+            let object = plate(&mut scene, Vec3::ZERO);
+            let settings = match technique {
+                "path" => json!({"path_set": "LE|L.E|L.[DG]E"}),
+                _ => json!({"object": object, "place": [0.3, 0.1 * side, 0.0]}),
+            };
+            let found = rendered(&renderer(gpu, &scene), technique, 8, 16, settings);
+            let gathers = found.report.counters.get("gathers").copied().unwrap_or(0);
+            (layer(&found, "radiance").iter().sum(), gathers)
+        };
+        let [(below, gathers), (above, _)] = [-1.0, 1.0].map(|side| picture(side, "localized-gather"));
+        assert_eq!(gathers, 8 * 8 * 16);
+        println!("below {below}, above {above}");
+        // Cones of lights far below the horizon leave the rounding of their table.
+        assert!(above > 1.0 && below < 1e-3 * above, "{below} {above}");
+        assert_eq!(picture(-1.0, "path").0, 0.0);
+    });
+}

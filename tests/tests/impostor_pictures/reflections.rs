@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use super::*;
 use clerestory::film::z_test::{SIGNIFICANCE, z_test};
+use clerestory::maps::impostor::ImpostorRay;
 use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
 use clerestory::scene::Environment;
 use clerestory::techniques::impostors::{ImpostorReflections, LookUp, ReflectionMethod, ReflectionSettings};
 use clerestory::transport::GpuScene;
+use clerestory_tests::render::cuboid;
 
 const RADIUS: f64 = 0.3;
 
@@ -133,6 +135,71 @@ fn directions_err_as_published() {
                 assert!(mean < last + 0.03, "{} {method:?}: {mean} after {last}", sphere.name);
                 last = mean;
             }
+        }
+    });
+}
+
+/// A mirror sphere beside or behind a pillar: what the map's place does not see is in further layers, with the light of the sides that turn away.
+#[test]
+fn layers_show_what_a_pillar_hides() {
+    with_gpu(|gpu| {
+        for (sphere, published) in [(ShinySphere::P1, [69.9, 98.7]), (ShinySphere::P2, [30.8, 99.1])] {
+            let mut scene = room_with(mirror(), sphere.centre, sphere.radius, sphere.camera, 1.0, 1.0);
+            lamp(&mut scene, 1.0);
+            let stone = scene.add_material(Material::lambert("stone", Vec3::new(0.9, 0.7, 0.2)));
+            let [low, high] = sphere.room.obstacle.unwrap().map(|corner| corner.as_vec3());
+            scene.place(cuboid("pillar", stone, low, high));
+            let on_device = Arc::new(GpuScene::new(gpu, &scene).unwrap());
+            for (layers, published) in [1, 3].into_iter().zip(published) {
+                let settings = ReflectionSettings {
+                    reflector: Some(SPHERE),
+                    place: Some([0.0; 3]),
+                    side: 512,
+                    method: ReflectionMethod::March,
+                    steps: 64,
+                    layers,
+                    capture_samples: 1,
+                    keeps_look_ups: true,
+                    ..ReflectionSettings::default()
+                };
+                let mut technique =
+                    ImpostorReflections::new(gpu, on_device.clone(), &scene.cameras[0], [64; 2], settings).unwrap();
+                while technique.step(1).unwrap().is_some() {}
+                let found = technique.looked_up().unwrap();
+                let good = found.iter().filter(|look_up| {
+                    let ray = ImpostorRay {
+                        origin: look_up.origin.as_dvec3(),
+                        direction: look_up.direction.as_dvec3().normalize(),
+                    };
+                    sphere.room.error(&ray, look_up.found.as_dvec3()) < 1.0
+                });
+                let share = 100.0 * good.count() as f64 / found.len() as f64;
+                println!(
+                    "{}, {layers} layers: {share:.1} % below 1°, published {published} %",
+                    sphere.name
+                );
+                assert!((share - published).abs() < 1.5, "{} {layers}: {share}", sphere.name);
+                assert_eq!(technique.counters()["map_bytes"], 512 * 512 * 20 * u64::from(layers));
+            }
+            // Pictures follow.
+            const SIZE: u32 = 24;
+            let on = pixels_of_sphere(&scene, SIZE, sphere.centre, sphere.radius, true);
+            let renderer = renderer(gpu, &scene);
+            let of = |layers: u32| {
+                let settings = json!({"reflector": SPHERE, "place": [0.0, 0.0, 0.0], "method": "march", "steps": 64, "layers": layers, "capture": "rays", "capture_samples": 1, "sampler": "pcg"});
+                rendered(&renderer, "impostor", SIZE, 64, settings)
+            };
+            let [one, three] = [1, 3].map(of);
+            let expected = traced(&renderer, &one, SIZE, 256);
+            let [off, left] = [&one, &three].map(|found| errors_beyond_noise(found, &expected, &on)[0]);
+            println!(
+                "{}: pictures are off by {off:.4} with one layer, by {left:.4} with three",
+                sphere.name
+            );
+            assert!(left < 0.35 * off, "{}: {left} {off}", sphere.name);
+            // One layer takes no rays to find further ones.
+            let peels = |rendered: &Rendered| rendered.report.passes.iter().any(|pass| pass.name == "trace");
+            assert!(!peels(&one) && peels(&three));
         }
     });
 }

@@ -4,6 +4,7 @@ mod light;
 mod live;
 mod moving;
 mod penumbra;
+mod planar;
 mod reflections;
 mod shadows;
 mod subject;

@@ -1,6 +1,7 @@
 //! Complex indices of refraction of common metals, per RGB channel, from measured spectra.
 //!
 //! Four of them stand beside a second sample (`hagemann.rs`), under names of their own; a scene can name a file of its own, too ([`IndexSpectrum`]).
+//! [`bins`] has spectra at more than three wavelengths.
 //!
 //! A channel's n and k are the means of the measured n and k (`spectra.rs`, interpolated linearly) over the channel's sensitivity
 //! (`observer.rs`): CIE 1931 matching functions under D65, taken to linear Rec. 709. Guarantees, by the tests below: the normal
@@ -9,6 +10,7 @@
 //! comes in, and the channel has 0.98.
 
 pub mod artistic;
+pub mod bins;
 mod form;
 mod hagemann;
 mod index_spectrum;

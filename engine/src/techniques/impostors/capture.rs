@@ -7,7 +7,7 @@
 //! shadows. Radiance is that at the middles of texels, towards the place.
 //!
 //! - [`CaptureBy::Raster`]: the preview's shading with its shadow maps, one pass; light of points, spots and directions alone.
-//! - [`CaptureBy::Rays`]: the path tracer on a range of bounces; all light, with noise.
+//! - [`CaptureBy::Rays`]: the path tracer on a range of bounces; all light, with noise. It has further layers of surfaces behind the first where they are asked for (`peel.rs`).
 //!
 //! Bias: shadows of the former are those of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), directional lights cast none. Surfaces nearer than 2⁻¹⁴ of the way to the farthest one are not
 //! drawn. Deterministic.
@@ -17,21 +17,21 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec2, Vec3};
 
+use super::draw::{MapDrawing, shadows_of_side};
+use super::peel::Layers;
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::constants::PACKED_NORMAL_BITS;
+use crate::gpu::shaders::maps::{directional_border, directional_coarser};
 use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert};
 use crate::gpu::shaders::techniques::path::path_directions;
 use crate::gpu::shaders::techniques::preview::preview_shade;
 use crate::gpu::shaders::types::SceneTriangle;
-use crate::gpu::{Area, Buffer, BufferDesc, Category, Gpu, PipelineInfo, Timings};
+use crate::gpu::{Buffer, BufferDesc, Category, Gpu, PipelineInfo, Timings};
 use crate::maps::impostor::ImpostorImage;
-use crate::maps::octahedron::OctahedronLayout;
 use crate::maps::packed_direction::unpack_octahedral;
 use crate::maps::{MapImage, Parametrization};
-use crate::raster::{DrawPart, GBuffer, GBufferDesc, Layering, OctantCut, Output, SHADOW_MAPS_MAX, Surfaces, View};
-use crate::techniques::preview::{
-    Eye, LightRoom, PreviewLights, PreviewPart, PreviewShadows, SHADED_OUTPUTS, Seen, Shade, Target,
-};
+use crate::raster::{Output, SHADOW_MAPS_MAX};
+use crate::techniques::preview::LightRoom;
 use crate::techniques::{PathTracer, PathTracerSettings, reasons};
 use crate::transport::path_set::PATH_SET_LOBES;
 use crate::transport::random::SamplerKind;
@@ -42,7 +42,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaptureBy {
-    /// By rasterization where points and spots alone emit light and nothing is there in part, by rays elsewhere.
+    /// By rasterization where points and spots alone emit light, nothing is there in part and shadow maps fit, by rays elsewhere.
     #[default]
     Auto,
     /// By rasterization with shadow maps: light of points, spots and directions, scattered once.
@@ -55,26 +55,32 @@ pub enum CaptureBy {
 pub(in crate::techniques) const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"];
 
 /// What a map may take, beside what eye paths do.
-pub(in crate::techniques) const KERNELS: [&ShaderInfo; 4] = [
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 6] = [
     &path_directions::INFO,
     &preview_shade::INFO,
     &surface_octant_vert::INFO,
     &surface_frag::INFO,
+    &directional_coarser::INFO,
+    &directional_border::INFO,
 ];
 
-/// By how much paths begin in front of what a texel shows, as a part of its distance.
-const LEAD: f32 = 1.0 / 1024.0;
 /// Of the paths of all maps: their noise is the same in all samples and in pictures of all seeds, so that pilot pictures show it as the bias that it is.
 const CAPTURE_SEED: u32 = 0x6d61_7021;
 /// Lights that are drawn, at most: their records go into the command buffer.
 const LIGHTS_MAX: usize = 1024;
 
 impl CaptureBy {
-    /// What it is for a scene and the number of bounces that are wanted.
+    /// What it is for a scene, the numbers of bounces and of layers that are wanted, and a side of shadow maps.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for rasterization of light that it does not bring.
-    pub(in crate::techniques) fn resolved(self, technique: &str, scene: &GpuScene, most_bounces: u32) -> Result<Self> {
+    /// [`Error::Unsupported`] for rasterization of light that it does not bring; [`Error::Setting`] and [`Error::LimitExceeded`] for rasterization with shadow maps that do not fit.
+    pub(in crate::techniques) fn resolved(
+        self,
+        technique: &str,
+        (gpu, scene): (&Gpu, &GpuScene),
+        [most_bounces, layers]: [u32; 2],
+        shadow_side: u32,
+    ) -> Result<Self> {
         let profile = scene.profile();
         let placed = profile.lights.point + profile.lights.spot;
         let reasons = reasons(&[
@@ -91,20 +97,26 @@ impl CaptureBy {
                 "surfaces of a rasterized map scatter light once; capture by rays scatters it as often as is asked for",
             ),
             (
+                layers != 1,
+                "a rasterized map has one layer of surfaces; capture by rays finds those behind it",
+            ),
+            (
                 placed > SHADOW_MAPS_MAX as usize || placed + profile.lights.directional > LIGHTS_MAX,
                 "there are more lights than rasterized maps have; capture by rays takes all",
             ),
         ]);
         // What it draws otherwise than it is.
         let is_off = profile.lights.directional > 0 || profile.alpha.blend;
+        let fit = || shadows_of_side(shadow_side).fit(gpu, LightRoom::of(&scene.lights_without_area()));
         match self {
-            Self::Auto if reasons.is_empty() && !is_off => Ok(Self::Raster),
+            Self::Auto if reasons.is_empty() && !is_off && fit().is_ok() => Ok(Self::Raster),
             Self::Auto => Ok(Self::Rays),
             Self::Raster if !reasons.is_empty() => Err(Error::Unsupported {
                 technique: technique.into(),
                 reasons,
             }),
-            other => Ok(other),
+            Self::Raster => fit().map(|()| Self::Raster),
+            Self::Rays => Ok(Self::Rays),
         }
     }
 }
@@ -122,6 +134,8 @@ pub(in crate::techniques) struct CapturePlan {
     pub bounces: [u32; 2],
     /// Whether distances and normals are wanted.
     pub with_distances: bool,
+    /// Layers of surfaces; 1 without distances, and of a drawn map.
+    pub layers: u32,
     /// Triangles that are left out, in their order.
     pub left_out: Vec<Range<u32>>,
     /// Texels along a side of the shadow maps.
@@ -132,18 +146,25 @@ pub(in crate::techniques) struct CapturePlan {
     pub sampler: SamplerKind,
 }
 
+impl CapturePlan {
+    /// Bytes of a layer's radiance.
+    fn layer_bytes(&self) -> u64 {
+        u64::from(self.side) * u64::from(self.side) * size_of::<[f32; 3]>() as u64
+    }
+}
+
 /// A map of what a place sees.
 pub(in crate::techniques) struct Captured {
     /// Texels along a side.
     pub side: u32,
-    /// Radiance, three f32 a texel, row by row; visible to compute shaders.
+    /// Radiance, three f32 a texel, row by row, layer of surfaces by layer; visible to compute shaders.
     pub radiance: Buffer,
     /// Distances and normals, where they were wanted.
     pub impostor: Option<ImpostorImage>,
 }
 
 impl Captured {
-    /// The radiance on the host.
+    /// The radiance of the first layer on the host.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
@@ -154,29 +175,38 @@ impl Captured {
     }
 }
 
+/// What the radiance is called among buffers.
+const RADIANCE: &str = "captured radiance";
 /// The map's parametrization.
 pub(in crate::techniques) const MAP: Parametrization = Parametrization::OctahedronQuadratic;
 
 /// A capture under way.
 pub(in crate::techniques) struct Capture {
     plan: CapturePlan,
-    gbuffer: GBuffer,
-    by: By,
+    drawing: MapDrawing,
+    /// Of the layer whose paths are traced.
+    tracer: Option<Box<PathTracer>>,
+    /// Layers whose radiance is there.
+    layers_done: u32,
     radiance: Buffer,
+    /// What was drawn, and found behind it, until it is an impostor.
+    layers: Option<Layers>,
     impostor: Option<ImpostorImage>,
-    is_drawn: bool,
+    counts: CaptureCounts,
+    /// What has traced its paths.
+    traced_by: Vec<PipelineInfo>,
     is_done: bool,
 }
 
-enum By {
-    Raster(Box<Shading>),
-    Rays(Option<Box<PathTracer>>),
-}
-
-/// What shades a drawn map.
-struct Shading {
-    lights: PreviewLights,
-    shade: Shade,
+/// Work of a map that is captured by rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(in crate::techniques) struct CaptureCounts {
+    /// Paths begun.
+    pub paths: u64,
+    /// Rays of all kinds.
+    pub rays: u64,
+    /// Paths that were left out since they brought no finite number.
+    pub non_finite: u64,
 }
 
 impl Capture {
@@ -189,59 +219,41 @@ impl Capture {
         if !plan.place.is_finite() {
             return Err(Error::setting("place", plan.place, "is not finite"));
         }
-        let surfaces = scene.surfaces();
-        let is_drawn = plan.by == CaptureBy::Raster;
-        let mut outputs = Vec::new();
-        if is_drawn {
-            outputs.extend(SHADED_OUTPUTS);
-        }
-        // Paths begin by distances, whoever else wants them.
-        if plan.with_distances || !is_drawn {
-            outputs.extend([Output::Distance, Output::Normals]);
-        }
-        let gbuffer = GBuffer::new(
-            gpu,
-            &surfaces,
-            &GBufferDesc {
-                size: [plan.side; 2],
-                layering: Layering::Octants(OctantCut::default()),
-                outputs: &outputs,
-            },
-        )?;
-        let shading = || -> Result<_> {
-            let room = LightRoom::of(&scene.lights_without_area());
-            let shadows = (room.placed > 0).then_some(PreviewShadows {
-                side: plan.shadow_side,
-                ..PreviewShadows::default()
+        let bytes = plan.layer_bytes() * u64::from(plan.layers);
+        let limit = gpu.caps().max_storage_buffer_range;
+        if bytes > limit {
+            return Err(Error::LimitExceeded {
+                name: RADIANCE.into(),
+                value: bytes,
+                limit_name: "maxStorageBufferRange",
+                limit,
             });
-            let lights = PreviewLights::new(gpu, &surfaces, room, shadows)?;
-            let shade = Shade::new(gpu, scene, &lights, true, false)?;
-            Ok(Box::new(Shading { lights, shade }))
-        };
-        let bytes = u64::from(plan.side) * u64::from(plan.side) * size_of::<[f32; 3]>() as u64;
+        }
         Ok(Self {
-            by: if is_drawn {
-                By::Raster(shading()?)
-            } else {
-                By::Rays(None)
-            },
-            gbuffer,
-            radiance: gpu.buffer(&BufferDesc::storage("captured radiance", bytes, Category::Light))?,
+            drawing: MapDrawing::new(gpu, scene, &plan)?,
+            tracer: None,
+            layers_done: 0,
+            radiance: gpu.buffer(&BufferDesc::storage(RADIANCE, bytes, Category::Light))?,
+            layers: None,
             impostor: None,
-            is_drawn: false,
+            counts: CaptureCounts::default(),
+            traced_by: Vec::new(),
             is_done: false,
             plan,
         })
     }
 
-    /// What draws and shades it, or traces its paths once they are under way.
+    /// What draws and shades it, and traces its paths once they are under way.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        let mut all = self.gbuffer.pipelines();
-        match &self.by {
-            By::Raster(shading) => all.extend(shading.shade.pipelines()),
-            By::Rays(tracer) => all.extend(tracer.iter().flat_map(|tracer| tracer.pipelines())),
-        }
+        let mut all = self.drawing.pipelines();
+        all.extend(self.tracer.iter().flat_map(|tracer| tracer.pipelines()));
+        all.extend(self.traced_by.iter().cloned());
         all
+    }
+
+    /// Its paths, once they have ended; none of a drawn map.
+    pub fn counts(&self) -> CaptureCounts {
+        self.counts
     }
 
     /// Whether the map is there.
@@ -258,151 +270,93 @@ impl Capture {
         }
     }
 
-    /// A piece of the work: the drawing, with its shading, or a submission of paths.
+    /// A piece of the work, bounded whatever the scene: of the drawing, of a further layer, or a submission of paths.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a place on a surface; [`Error::OutOfMemory`], [`Error::DeviceLost`].
+    /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
     pub fn advance(&mut self, gpu: &Gpu, scene: &Arc<GpuScene>) -> Result<Vec<Timings>> {
-        if !self.is_drawn {
-            let timings = self.draw(gpu, scene)?;
-            self.is_drawn = true;
-            self.is_done = matches!(self.by, By::Raster(_));
+        if !self.drawing.is_done() {
+            let timings = self.drawing.advance(gpu, scene, &self.plan, &self.radiance)?;
+            if self.drawing.is_done() {
+                self.layers = self.read_layer(gpu)?;
+                if self.plan.by == CaptureBy::Raster {
+                    self.finish()?;
+                }
+            }
             return Ok(timings);
         }
-        let By::Rays(tracer) = &mut self.by else {
+        let wanted = self.plan.layers;
+        let Some(layers) = &mut self.layers else {
             return Ok(Vec::new());
         };
-        let tracer = match tracer {
+        if !layers.has(wanted) {
+            return Ok(vec![layers.advance(gpu, scene)?]);
+        }
+        let done = self.layers_done;
+        let tracer = match &mut self.tracer {
             Some(tracer) => tracer,
-            None => tracer.insert(Box::new(paths(gpu, scene, &self.plan, self.impostor.as_ref())?)),
+            None => {
+                let tracer = paths(gpu, scene, &self.plan, layers, done)?;
+                self.tracer.insert(Box::new(tracer))
+            }
         };
         if let Some(step) = tracer.step(self.plan.samples)? {
             return Ok(step.timings);
         }
-        let (picture, _) = tracer.picture()?;
+        let (picture, non_finite) = tracer.picture()?;
+        let counters = tracer.counters();
+        self.counts.paths += counters.paths;
+        self.counts.rays += counters.extend_rays + counters.shadow_rays;
+        self.counts.non_finite += non_finite.total();
+        self.traced_by = tracer.pipelines();
         let radiance = picture.layer("radiance").map_or(&[][..], |layer| layer.values());
-        gpu.upload(&self.radiance, 0, radiance)?;
-        self.by = By::Rays(None);
-        self.is_done = true;
+        gpu.upload(&self.radiance, u64::from(done) * self.plan.layer_bytes(), radiance)?;
+        self.tracer = None;
+        self.layers_done += 1;
+        if self.layers_done == wanted {
+            self.finish()?;
+        }
         Ok(Vec::new())
     }
 
-    /// What the place sees, and its shading where that is drawn.
-    fn draw(&mut self, gpu: &Gpu, scene: &GpuScene) -> Result<Vec<Timings>> {
-        let plan = &self.plan;
-        let surfaces = scene.surfaces();
-        let near = View::near_plane(plan.place, &surfaces);
-        let views = View::of_octants(
-            plan.place,
-            OctahedronLayout::Quadratic,
-            near,
-            Area::whole([plan.side; 2]),
-        )?;
-        let mut timings = Vec::new();
-        let mut recorder = gpu.recorder("capture")?;
-        for part in parts_without(&surfaces, &plan.left_out) {
-            if recorder.passes_left() == 0 {
-                timings.push(
-                    std::mem::replace(&mut recorder, gpu.recorder("capture")?)
-                        .submit()?
-                        .wait()?,
-                );
-            }
-            self.gbuffer.record_part(&mut recorder, &surfaces, &views, &part)?;
+    /// Makes an impostor of the layers, where one is wanted.
+    fn finish(&mut self) -> Result<()> {
+        if let Some(layers) = self.layers.take()
+            && self.plan.with_distances
+        {
+            self.impostor = Some(layers.image()?);
         }
-        timings.push(recorder.submit()?.wait()?);
-        if self.gbuffer.image(Output::Distance).is_some() {
-            self.impostor = Some(self.read_impostor(gpu)?);
-        }
-        if let By::Raster(shading) = &mut self.by {
-            let Shading { lights, shade } = &mut **shading;
-            let mut recorder = gpu.recorder("capture")?;
-            lights.record(&mut recorder, &surfaces, &scene.lights_without_area())?;
-            recorder.pass("capture: shade", |pass| {
-                let seen = Seen {
-                    scene,
-                    gbuffer: &self.gbuffer,
-                    lights: &*lights,
-                    eye: Eye::AllDirections(plan.place),
-                    target: Target {
-                        buffer: &self.radiance,
-                        first: 0,
-                        stride: plan.side,
-                    },
-                };
-                let part = PreviewPart {
-                    triangles: 0..surfaces.triangles,
-                    background: true,
-                    probe: None,
-                };
-                shade.record(pass, &seen, &[part])
-            })?;
-            timings.push(recorder.submit()?.wait()?);
-        }
-        Ok(timings)
+        self.is_done = true;
+        Ok(())
     }
 
-    fn read_impostor(&self, gpu: &Gpu) -> Result<ImpostorImage> {
-        let distances: Vec<f32> = self.gbuffer.read(gpu, Output::Distance)?;
-        if distances.iter().any(|distance| distance.is_nan() || *distance <= 0.0) {
-            return Err(Error::setting("place", self.plan.place, "lies on a surface"));
+    /// What was drawn, where distances are.
+    fn read_layer(&self, gpu: &Gpu) -> Result<Option<Layers>> {
+        let gbuffer = self.drawing.gbuffer();
+        if gbuffer.image(Output::Distance).is_none() {
+            return Ok(None);
         }
-        let words: Vec<[u32; 2]> = self.gbuffer.read(gpu, Output::Normals)?;
+        let distances: Vec<f32> = gbuffer.read(gpu, Output::Distance)?;
+        let words: Vec<[u32; 2]> = gbuffer.read(gpu, Output::Normals)?;
         let normals: Vec<DVec3> = words
             .iter()
             .map(|[geometric, _]| unpack_octahedral(*geometric, PACKED_NORMAL_BITS))
             .collect();
         let nothing = ImpostorImage::NOTHING;
         let distances = distances.into_iter().map(|distance| distance.min(nothing)).collect();
-        ImpostorImage::new(MAP, UVec2::splat(self.plan.side), 1, distances, Some(&normals))
+        let triangles = match self.plan.layers {
+            1 => Vec::new(),
+            _ => gbuffer.read(gpu, Output::Triangle)?,
+        };
+        Ok(Some(Layers::new(&self.plan, distances, normals, triangles)))
     }
 }
 
-/// Numbers of triangles, up to a count, but those that are left out; an empty range where none is left.
-fn ranges_without(count: u32, left_out: &[Range<u32>]) -> Vec<Range<u32>> {
-    let mut kept = Vec::new();
-    let mut start = 0;
-    for range in left_out {
-        if start < range.start {
-            kept.push(start..range.start);
-        }
-        start = start.max(range.end);
-    }
-    if start < count || kept.is_empty() {
-        kept.push(start.min(count)..count);
-    }
-    kept
-}
-
-/// The draws of all triangles but those that are left out: an empty picture is drawn, too.
-fn parts_without(surfaces: &Surfaces<'_>, left_out: &[Range<u32>]) -> Vec<DrawPart> {
-    let drawn = ranges_without(surfaces.triangles, left_out);
-    let last = drawn.len() - 1;
-    let part = |(number, triangles)| DrawPart {
-        triangles,
-        begins: number == 0,
-        ends: number == last,
-    };
-    drawn.into_iter().enumerate().map(part).collect()
-}
-
-/// The paths of a map: each begins in front of what its texel shows, or outside of the scene.
-fn paths(gpu: &Gpu, scene: &Arc<GpuScene>, plan: &CapturePlan, impostor: Option<&ImpostorImage>) -> Result<PathTracer> {
+/// The paths of a layer of a map: each begins in front of what its texel shows, or behind it, or outside of the scene.
+fn paths(gpu: &Gpu, scene: &Arc<GpuScene>, plan: &CapturePlan, layers: &Layers, layer: u32) -> Result<PathTracer> {
     // Finite, so that origins are.
     let outside = (2.0 * scene.surfaces().reach(plan.place)).min(ImpostorImage::NOTHING);
-    let start = |distance: &f32| {
-        if *distance < ImpostorImage::NOTHING {
-            (1.0 - LEAD) * distance
-        } else {
-            outside
-        }
-    };
-    let starts: Vec<f32> = impostor
-        .map_or(&[][..], ImpostorImage::distances)
-        .iter()
-        .map(start)
-        .collect();
-    let starts = gpu.buffer_with("capture: starts", Category::Work, &starts)?;
+    let starts = gpu.buffer_with("capture: starts", Category::Work, &layers.starts(layer, outside))?;
     let [least, most] = plan.bounces;
     let settings = PathTracerSettings {
         path_set: PathSet::new(least, Some(most), PATH_SET_LOBES)?,
@@ -429,24 +383,4 @@ pub(in crate::techniques) fn middle_of(gpu: &Gpu, scene: &GpuScene, ranges: &[Ra
         }
     }
     Ok((low.x <= high.x).then(|| low + 0.5 * (high - low)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    #[expect(clippy::single_range_in_vec_init, reason = "ranges of triangles, not their numbers")]
-    fn parts_are_all_but_what_is_left_out() {
-        let drawn = |count: u32, left_out: &[Range<u32>]| -> Vec<Range<u32>> {
-            let parts = ranges_without(count, left_out);
-            assert!(parts.iter().all(|range| range.end <= count));
-            parts
-        };
-        assert_eq!(drawn(10, &[]), [0..10]);
-        assert_eq!(drawn(10, &[2..4, 4..5, 7..10]), [0..2, 5..7]);
-        assert_eq!(drawn(10, &[0..3]), [3..10]);
-        assert_eq!(drawn(4, &[0..4]), [4..4]);
-        assert_eq!(drawn(0, &[]), [0..0]);
-    }
 }

@@ -87,7 +87,7 @@ const ROWS: &[Row] = &[
         id: "CL-IMPOSTOR",
         name: "technique `impostor`: direct light, and reflections of smooth surfaces by a distance impostor",
         role: Role::Technique,
-        limits: "One layer of surfaces, so that what the map's place does not see is not there; reflecting bodies do not show in reflections.",
+        limits: "Few layers of surfaces, by default one, so that what the map's place does not see is not there; reflecting bodies do not show in reflections.",
         sources: &[
             sources::SZIRMAY_KALOS_2005.whole(),
             sources::UMENHOFFER_2007.at("chapter 17"),
@@ -136,14 +136,35 @@ const ROWS: &[Row] = &[
         )),
         needs: capture::NEEDS,
         tests: &[
-            "engine/src/techniques/impostors/capture.rs::parts_are_all_but_what_is_left_out",
+            "engine/src/techniques/impostors/draw.rs::parts_are_all_but_what_is_left_out",
             "tests/tests/impostor_pictures/reflections.rs::area_lights_and_skies_are_mirrored_by_rays",
             "tests/tests/impostor_pictures/reflections.rs::scale_changes_nothing",
             "tests/tests/impostor_pictures/edge_cases.rs::without_a_reflector_there_is_no_map",
             "tests/tests/impostor_pictures/edge_cases.rs::hard_places_give_finite_pictures",
+            "tests/tests/impostor_pictures/edge_cases.rs::maps_tell_what_they_took",
         ],
         settings: &["capture", "side", "capture_samples", "shadow_side", "bounces"],
         ..Row::of("engine/src/techniques/impostors/capture.rs")
+    },
+    Row {
+        id: "CL-PEELED-CAPTURE",
+        name: "further layers of surfaces of a map: behind each the next one, by rays",
+        role: Role::PartOf("CL-IMPOSTOR"),
+        limits: "Four layers at most, in maps captured by rays; alpha is not looked at, and surfaces that nearly touch are one.",
+        sources: &[sources::EVERITT_2001.whole(), sources::SZIRMAY_KALOS_2009.whole()],
+        shaders: &[
+            "shaders/accel/trace_rays.comp",
+            "shaders/techniques/path/path_directions.comp",
+        ],
+        bias: Some(Bias::Biased(
+            "what lies behind more surfaces than there are layers is not there",
+        )),
+        tests: &[
+            "engine/src/techniques/impostors/peel.rs::paths_begin_between_layers",
+            "tests/tests/impostor_pictures/reflections.rs::layers_show_what_a_pillar_hides",
+        ],
+        settings: &["layers"],
+        ..Row::of("engine/src/techniques/impostors/peel.rs")
     },
 ];
 

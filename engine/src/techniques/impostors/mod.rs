@@ -11,7 +11,7 @@
 //!
 //! Bias, all of it:
 //!
-//! - What the map's place does not see is not there: reflections stick to the edges of what hides it.
+//! - What the map's place does not see is not there: reflections stick to the edges of what hides it. With further layers of surfaces, which a map by rays has, that is what lies behind more surfaces than these.
 //! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same.
 //! - Searches end beside surfaces: by how much, [`ImpostorReflections::counts`] and [`LookUp::residual`] say.
 //! - Radiance at texels' middles is joined bilinearly; with a capture by rays its noise stays, and is the same for all seeds.
@@ -25,6 +25,8 @@
 
 pub(in crate::techniques) mod capture;
 mod card;
+mod draw;
+mod peel;
 mod reflections;
 pub(in crate::techniques) mod renderer;
 mod settings;

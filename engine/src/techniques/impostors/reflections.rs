@@ -30,6 +30,8 @@ pub struct ImpostorReflections {
     settings: ReflectionSettings,
     path_set: PathSet,
     place: Vec3,
+    /// How the map is captured, where there is one.
+    captured_by: Option<CaptureBy>,
     renderer: MapRenderer<LookUps>,
 }
 
@@ -134,13 +136,19 @@ impl ImpostorReflections {
             Some(_) => left_out.first().cloned().unwrap_or(0..0),
             None => 0..surfaces.triangles,
         };
-        let by = settings.capture.resolved(TECHNIQUE, &scene, settings.bounces)?;
+        let by = settings.capture.resolved(
+            TECHNIQUE,
+            (gpu, &scene),
+            [settings.bounces, settings.layers],
+            settings.shadow_side,
+        )?;
         let plan = CapturePlan {
             place,
             side: settings.side,
             by,
             bounces: [0, settings.bounces],
             with_distances: settings.search().is_some(),
+            layers: settings.layers,
             left_out,
             shadow_side: settings.shadow_side,
             samples: settings.capture_samples,
@@ -163,6 +171,7 @@ impl ImpostorReflections {
             settings,
             path_set,
             place,
+            captured_by: has_reflector.then_some(by),
             renderer: MapRenderer::new(gpu, scene, tracer, capture, look_ups),
         })
     }
@@ -182,11 +191,10 @@ impl ImpostorReflections {
         self.path_set
     }
 
-    /// Does a bounded piece of work towards `samples` samples per pixel: a piece of the map, or a submission of eye paths; `None` when all samples are there. A
-    /// rasterized map is one piece, however many triangles there are.
+    /// Does a bounded piece of work towards `samples` samples per pixel: a piece of the map, or a submission of eye paths; `None` when all samples are there.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a place on a surface; [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         self.renderer.step(samples)
     }
@@ -251,7 +259,7 @@ impl ImpostorReflections {
                 why: "the method looks none up",
             });
         }
-        if self.settings.capture == CaptureBy::Rays {
+        if self.captured_by == Some(CaptureBy::Rays) {
             all.push(Skipped {
                 what: "shadow maps",
                 why: "the map is captured by rays",

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::capture::{Capture, Captured};
+use super::capture::{Capture, CaptureCounts, Captured};
 use crate::Result;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
@@ -54,8 +54,11 @@ pub(in crate::techniques) struct MapRenderer<U> {
     /// Until the map is there; `None` from then on, and where none is needed.
     capture: Option<Capture>,
     has_map: bool,
-    /// Work of the map: submissions.
+    /// What has made the map that is there.
+    captured_by: Vec<PipelineInfo>,
+    /// Work of the map: submissions, and what they have traced.
     capture_steps: u64,
+    capture_counts: CaptureCounts,
     pub map_use: U,
 }
 
@@ -67,7 +70,9 @@ impl<U: MapUse> MapRenderer<U> {
             eye,
             has_map: capture.is_some(),
             capture,
+            captured_by: Vec::new(),
             capture_steps: 0,
+            capture_counts: CaptureCounts::default(),
             map_use,
         }
     }
@@ -85,6 +90,8 @@ impl<U: MapUse> MapRenderer<U> {
             let timings = capture.advance(&self.gpu, &self.scene)?;
             self.capture_steps += 1;
             if let Some(capture) = self.capture.take_if(|capture| capture.is_done()) {
+                self.captured_by = capture.pipelines();
+                self.capture_counts = capture.counts();
                 let slots = self.eye.slots();
                 self.map_use
                     .take(&self.gpu, &self.scene, capture.into_captured(), slots)?;
@@ -126,6 +133,9 @@ impl<U: MapUse> MapRenderer<U> {
             ("stalls", eye.stalls),
             ("postponed", eye.postponed),
             ("capture_steps", self.capture_steps),
+            ("map_paths", self.capture_counts.paths),
+            ("map_rays", self.capture_counts.rays),
+            ("map_non_finite", self.capture_counts.non_finite),
         ]);
         all.extend(self.map_use.counters());
         all
@@ -134,6 +144,7 @@ impl<U: MapUse> MapRenderer<U> {
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = self.eye.pipelines();
         all.extend(self.capture.iter().flat_map(Capture::pipelines));
+        all.extend(self.captured_by.iter().cloned());
         all.extend(self.map_use.pipelines());
         all
     }

@@ -69,6 +69,9 @@ impl ReflectionMethod {
     }
 }
 
+/// Layers of surfaces at most: behind front, back and front again there is little that reflections miss.
+const LAYERS_MAX: u32 = 4;
+
 crate::settings! {
     /// Settings of [`ImpostorReflections`](super::ImpostorReflections).
     pub struct ReflectionSettings {
@@ -92,6 +95,10 @@ crate::settings! {
         pub tolerance: f32 = 0.02, in crate::settings::AboveTo(0.0, 0.99);
         /// How radiance comes into the map: rasterized, by rays, or by rays where rasterization lacks light of the scene.
         pub capture: CaptureBy = CaptureBy::Auto;
+        /// Layers of surfaces, each behind the last one: what is hidden from the map's place shows in reflections by those behind the first.
+        ///
+        /// More than one take a method that searches distances, best a march, and a capture by rays.
+        pub layers: u32 = 1, in 1..=LAYERS_MAX, unit "layers";
         /// Along a side of the map's octahedron: how sharp reflections are, and how near searches end.
         pub side: u32 = 256, in 16..=2048, unit "texels";
         /// Scatterings of the light in the map, at most; more than one take a capture by rays.
@@ -120,7 +127,14 @@ const EYE: &str = "LE|L[DGV]E";
 impl ReflectionSettings {
     fn fit(&self) -> Result<()> {
         check_place(self.place)?;
-        self.search().map_or(Ok(()), |search| search.check(1))
+        match self.search() {
+            Some(search) => search.check(self.layers),
+            None if self.layers > 1 => {
+                let cause = "take a method that searches distances";
+                Err(Error::setting("layers", self.layers, cause))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The search, where there is one.
@@ -208,6 +222,21 @@ mod tests {
                 "setting tolerance",
             ),
             (ReflectionSettings { side: 8, ..defaults() }, "setting side"),
+            (
+                ReflectionSettings {
+                    layers: LAYERS_MAX + 1,
+                    ..defaults()
+                },
+                "setting layers",
+            ),
+            (
+                ReflectionSettings {
+                    layers: 2,
+                    method: ReflectionMethod::Box,
+                    ..defaults()
+                },
+                "setting layers: 2 take a method",
+            ),
         ] {
             let error = settings.check().expect_err(words).to_string();
             assert!(error.contains(words), "{error}");

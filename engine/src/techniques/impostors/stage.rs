@@ -85,7 +85,7 @@ impl Reflections {
             impostor_method: search.map_or(IMPOSTOR_CLASSICAL, |search| search.method.number()),
             impostor_steps: search.map_or(0, |search| search.steps),
             impostor_bisections: search.map_or(0, |search| search.bisections),
-            impostor_layers: 1,
+            impostor_layers: settings.layers,
             impostor_planes: impostor.is_some(),
             reflects_in_box: settings.method == ReflectionMethod::Box,
             keeps_look_ups: settings.keeps_look_ups,

@@ -15,7 +15,7 @@
 //! - What the map's place does not see lights nothing, and radiance is that towards the map's place.
 //! - Each texel is one disc of even radiance: with normals the error falls with more of them, without it stays.
 //! - Microfacets reflect by a power of the cosine about the mirrored direction, of an exponent of 64 at most; their albedo is that of even surroundings.
-//! - At grazing views a half of the lobe about the mirrored direction is below the surface, where lights count that the surface does not see.
+//! - The lobe about the mirrored direction ends at the surface's horizon, and is scaled to the whole there: at grazing views, where a half of it is below, its mean direction is higher.
 //! - Rough conductors reflect by Schlick's factor.
 //! - The map is the capture's, with its shadows and its noise, which is the same for all seeds.
 //!

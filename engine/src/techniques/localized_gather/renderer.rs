@@ -122,7 +122,9 @@ impl LocalizedGather {
             },
         };
         let triangles = left_out.first().cloned().unwrap_or(0..surfaces.triangles);
-        let by = settings.capture.resolved(TECHNIQUE, &scene, settings.bounces)?;
+        let by = settings
+            .capture
+            .resolved(TECHNIQUE, (gpu, &scene), [settings.bounces, 1], settings.shadow_side)?;
         let plan = CapturePlan {
             place,
             side: settings.side,
@@ -130,6 +132,7 @@ impl LocalizedGather {
             // What emits is found by eye paths alone.
             bounces: [1, settings.bounces],
             with_distances: true,
+            layers: 1,
             left_out,
             shadow_side: settings.shadow_side,
             samples: settings.capture_samples,
@@ -170,11 +173,10 @@ impl LocalizedGather {
         self.path_set
     }
 
-    /// Does a bounded piece of work towards `samples` samples per pixel: a piece of the map, or a submission of eye paths; `None` when all samples are there. A
-    /// rasterized map is one piece, however many triangles there are.
+    /// Does a bounded piece of work towards `samples` samples per pixel: a piece of the map, or a submission of eye paths; `None` when all samples are there.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a place on a surface; [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         self.renderer.step(samples)
     }

@@ -50,7 +50,7 @@ impl DirectionsStage {
 
 impl PathTracer {
     /// A rendering of what is seen from a place (metres) in the directions of the octahedron's texels, `side` along each side, instead of through a camera. Paths of a
-    /// texel begin `starts` away from the place, metres, one number a texel, row by row, where no body is around them. Without AOVs, and in whole waves.
+    /// texel begin `starts` away from the place, metres, one number a texel, row by row, where no body is around them; those below 0 begin so far away, and go towards the place. Without AOVs, and in whole waves.
     ///
     /// # Errors
     /// As [`PathTracer::new`]; [`Error::Setting`] for a place that is not finite.

@@ -549,6 +549,21 @@ pub(crate) const ROWS: &[Row] = &[
         ..Row::of(file!())
     },
     Row {
+        id: "MET-E7",
+        name: "rays as the reference of reflections: direct light, and direct light in a mirror, `LE|L.E|L.SE`",
+        role: Role::PartOf("BG-3"),
+        limits: "Noise, where lights have an extent.",
+        sources: &[sources::KAJIYA_1986.whole(), sources::SZIRMAY_KALOS_2005.whole()],
+        shaders: &["shaders/techniques/path/path_shade.comp"],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "tests/tests/impostor_pictures/reflections.rs::mirrors_in_a_diffuse_room_show_what_the_path_tracer_shows",
+            "tests/tests/preview/planar.rs::a_planar_mirror_is_the_path_tracers",
+        ],
+        settings: &["path_set"],
+        ..Row::of(file!())
+    },
+    Row {
         id: "CL-ALPHA",
         name: "alpha: masks, and blending by chance",
         role: Role::PartOf("BG-3"),

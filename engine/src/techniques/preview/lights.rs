@@ -11,9 +11,12 @@ use crate::raster::{
 };
 use crate::scene::LightKind;
 use crate::scene::check::light_is_sound;
+use crate::techniques::Part;
 use crate::transport::gpu_scene::light_record;
 use crate::{Error, Result};
 
+/// What an iteration of shading takes, as so many steps of a ray through an index.
+const SHADING_WORK: u64 = 4;
 /// Iterations of the loops over a probe's levels: two look-ups.
 const PROBE_ITERATIONS: u64 = 2 * PROBE_LEVELS_MAX as u64;
 
@@ -52,6 +55,23 @@ impl PreviewShadows {
             return Err(Error::setting("lights", lights, cause));
         }
         Ok(())
+    }
+
+    /// Refuses maps of so many lights that cannot be made.
+    pub(in crate::techniques) fn fit(self, gpu: &Gpu, room: LightRoom) -> Result<()> {
+        self.check(gpu, room)?;
+        if room.placed > 0 {
+            self.desc(room).check(gpu)?;
+        }
+        Ok(())
+    }
+
+    const fn desc(self, room: LightRoom) -> OmniShadowDesc {
+        OmniShadowDesc {
+            layout: self.layout,
+            side: self.side,
+            maps: room.placed,
+        }
     }
 }
 
@@ -107,14 +127,7 @@ impl PreviewLights {
         if let Some(wanted) = shadows {
             wanted.check(gpu, room)?;
         }
-        let maps = |wanted: PreviewShadows| {
-            let desc = OmniShadowDesc {
-                layout: wanted.layout,
-                side: wanted.side,
-                maps: room.placed,
-            };
-            OmniShadowMaps::new(gpu, surfaces, desc)
-        };
+        let maps = |wanted: PreviewShadows| OmniShadowMaps::new(gpu, surfaces, wanted.desc(room));
         let bytes = u64::from(room.all.max(1)) * size_of::<SceneLight>() as u64;
         Ok(Self {
             most: room,
@@ -145,9 +158,9 @@ impl PreviewLights {
         &self.records
     }
 
-    /// Loop iterations of a pixel, at most.
-    pub(super) fn iterations(&self) -> u64 {
-        self.most.iterations(self.width)
+    /// Parts that so many pixels are shaded in.
+    pub(in crate::techniques) fn shading_parts(&self, gpu: &Gpu, pixels: u64) -> u32 {
+        Part::count(gpu, pixels * self.most.iterations(self.width) * SHADING_WORK)
     }
 
     /// Records shadow maps and records of these lights. Afterwards all is visible to compute shaders.
@@ -171,7 +184,11 @@ impl PreviewLights {
     }
 
     /// As [`PreviewLights::record`] without the shadow maps; from where these are seen.
-    pub(super) fn record_lights(&mut self, recorder: &mut Recorder, lights: &[LightKind]) -> Result<Vec<Vec3>> {
+    pub(in crate::techniques) fn record_lights(
+        &mut self,
+        recorder: &mut Recorder,
+        lights: &[LightKind],
+    ) -> Result<Vec<Vec3>> {
         let refuse = |value: usize, cause: String| Err(Error::setting("lights", value, cause));
         if lights.len() > self.most.all as usize {
             return refuse(lights.len(), format!("are more than the preview's {}", self.most.all));

@@ -107,13 +107,9 @@ impl PreviewMethod {
     /// Parts that pixels are shaded in.
     fn shading_parts(&self, gpu: &Gpu) -> u32 {
         let pixels: u64 = self.drawing.size().map(u64::from).iter().product();
-        let work = pixels * self.drawing.lights.iterations() * SHADING_WORK;
-        Part::count(gpu, work)
+        self.drawing.lights.shading_parts(gpu, pixels)
     }
 }
-
-/// What an iteration of shading takes, as so many steps of a ray through an index.
-const SHADING_WORK: u64 = 4;
 
 impl FrameMethod for PreviewMethod {
     fn begin(&mut self, recorder: &mut Recorder) -> Result<()> {

@@ -7,7 +7,8 @@
 //! What it shows: emission; point, spot and directional lights, through shadow maps where they have a place; light of a [`LightProbe`] by two
 //! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact albedo,
 //! but for rough metals by another factor than Schlick's. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them;
-//! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table.
+//! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table; and a [`PlanarMirror`] is a second picture,
+//! of what a plane shows.
 //!
 //! Bias, all of it:
 //!
@@ -33,6 +34,7 @@ mod drawing;
 mod lights;
 mod live;
 mod method;
+mod planar;
 pub mod probe;
 mod reflection;
 mod shade;
@@ -41,6 +43,7 @@ pub(super) use card::CARD;
 pub use lights::{PreviewLights, PreviewShadows};
 pub use live::LiveProbe;
 pub use method::{PreviewMethod, PreviewSettings};
+pub use planar::{MirrorPlane, PlanarMirror};
 pub use probe::{LightProbe, LightProbeDesc};
 pub use reflection::{ReflectionMap, ReflectionMapDesc};
 pub use shade::{PARTS_MAX, PreviewPart};
@@ -214,31 +217,32 @@ impl Preview {
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn picture(&self) -> Result<Picture> {
-        let [width, height] = self.desc.size;
-        let samples = self.desc.samples;
-        let across = (width * samples) as usize;
-        let all: Vec<[f32; 3]> = self
-            .gpu
-            .read(self.radiance.view(), across * (height * samples) as usize)?;
-        let mut values = Vec::with_capacity(3 * width as usize * height as usize);
-        for y in (0..height * samples).step_by(samples as usize) {
-            for x in 0..width {
-                let mut sum = glam::DVec3::ZERO;
-                for row in y..y + samples {
-                    let first = row as usize * across + (x * samples) as usize;
-                    let of_row = all[first..first + samples as usize].iter();
-                    sum += of_row
-                        .map(|v| glam::Vec3::from_array(*v).as_dvec3())
-                        .sum::<glam::DVec3>();
-                }
-                values.extend((sum / f64::from(samples * samples)).as_vec3().to_array());
-            }
-        }
-        Picture::from_radiance(width, height, values)
+        mean_of_samples(&self.gpu, &self.radiance, self.desc.size, self.desc.samples)
     }
 
     /// Bytes of its pictures and of the shadow maps.
     pub fn bytes(&self) -> u64 {
         self.drawing.bytes() + self.radiance.bytes()
     }
+}
+
+/// The picture of samples that lie row by row: means of each pixel's.
+fn mean_of_samples(gpu: &Gpu, radiance: &Buffer, [width, height]: [u32; 2], samples: u32) -> Result<Picture> {
+    let across = (width * samples) as usize;
+    let all: Vec<[f32; 3]> = gpu.read(radiance.view(), across * (height * samples) as usize)?;
+    let mut values = Vec::with_capacity(3 * width as usize * height as usize);
+    for y in (0..height * samples).step_by(samples as usize) {
+        for x in 0..width {
+            let mut sum = glam::DVec3::ZERO;
+            for row in y..y + samples {
+                let first = row as usize * across + (x * samples) as usize;
+                let of_row = all[first..first + samples as usize].iter();
+                sum += of_row
+                    .map(|v| glam::Vec3::from_array(*v).as_dvec3())
+                    .sum::<glam::DVec3>();
+            }
+            values.extend((sum / f64::from(samples * samples)).as_vec3().to_array());
+        }
+    }
+    Picture::from_radiance(width, height, values)
 }

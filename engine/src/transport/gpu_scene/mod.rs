@@ -261,6 +261,11 @@ impl GpuScene {
         }
     }
 
+    /// Its ray index.
+    pub(crate) fn index_on_device(&self) -> &IndexOnDevice {
+        &self.index
+    }
+
     /// How kernels traverse its ray index.
     pub fn index_traversal(&self) -> DeviceTraversal {
         self.index.traversal

@@ -1,7 +1,13 @@
 //! Maps with distances: searches along rays in them, and the light of their texels at other places.
 
+pub mod convolved_maps;
+pub mod exact_room;
+pub mod gather_counts;
+pub mod gather_glossy;
 pub mod gather_places;
 pub mod gather_table;
 pub mod gather_terms;
 pub mod impostor_methods;
+pub mod impostor_motion;
+pub mod impostor_occlusion;
 pub mod impostor_roots;

@@ -4,6 +4,7 @@ pub mod imperfect_maps;
 pub mod live_map_pictures;
 pub mod live_maps;
 mod live_stages;
+pub mod planar_mirrors;
 mod previewed;
 pub mod reflection_maps;
 mod reflection_stages;

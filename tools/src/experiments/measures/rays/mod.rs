@@ -3,6 +3,7 @@
 pub mod build_stages;
 pub mod camera_footprints;
 pub mod persistent_threads;
+pub mod ray_engine;
 pub mod ray_offsets;
 mod sphere_forms;
 pub mod sphere_tests;

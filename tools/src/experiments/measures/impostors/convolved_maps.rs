@@ -1,0 +1,218 @@
+//! Maps that are convolved once for all points: by the cosine for matte surfaces, by lobes for glossy ones.
+//!
+//! Oracles: the exact irradiance of the lit room at the map's place, for the widest lobe, which is the cosine; and the map itself, whose mean a filter keeps.
+
+use std::f64::consts::PI;
+
+use clerestory::Result;
+use clerestory::maps::gather::GatherPoint;
+use clerestory::maps::gather::lit_room::{LitRoom, relative_errors};
+use clerestory::maps::harmonics::HarmonicLight;
+use clerestory::maps::prefilter::prefilter_ggx;
+use clerestory::maps::{MapImage, Parametrization};
+use glam::{DVec3, UVec2};
+
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, rows};
+use crate::experiments::measures::Context;
+use crate::metal_forms::sheet;
+
+/// Texels along a side of a face of the map and of those that are made of it.
+const SIDES: [u32; 2] = [32, 16];
+/// Widths of lobes; at 1 the lobe is the cosine.
+const ALPHAS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
+const PICTURE: &str = "convolved.png";
+
+rows! {
+    /// A convolved map.
+    struct Row = "Maps of a lit room convolved by lobes" by [alpha] {
+        alpha: f64 = "width of the lobe (GGX alpha)",
+        exponent: f64 = "exponent of a cosine lobe about the half vector, as wide",
+        contrast: f64 = "deviation over the mean",
+        of_narrower: Option<f64> = "deviation over that of the next narrower lobe",
+        mean: f64 = "mean over that of the map",
+        brightest: f64 = "brightest texel over the mean",
+        off: Option<f64> = "RMS against the exact irradiance (%)",
+    }
+}
+rows! {
+    /// Light in harmonics.
+    struct Harmonics = "Irradiance by spherical harmonics" by [order] {
+        order: u64 = "order",
+        numbers: u64 = "numbers a band of colour",
+        off: f64 = "RMS against the exact irradiance (%)",
+        worst: f64 = "greatest error over the mean (%)",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    maps: Vec<Row>,
+    harmonics: Vec<Harmonics>,
+}
+
+const OF_HARMONICS: &[Criterion<Harmonics>] = &[
+    Criterion::each(
+        "nine numbers are near the irradiance: greatest error over the mean (%)",
+        Bound::AtMost(9.0),
+        |row: &Harmonics| row.worst.into(),
+    )
+    .among(|row| row.order == 2)
+    .because("no light is off by more, as was published"),
+    Criterion::each(
+        "twenty-five are nearer: RMS (%)",
+        Bound::AtMost(1.5),
+        |row: &Harmonics| row.off.into(),
+    )
+    .among(|row| row.order == 4),
+];
+
+/// Harmonics of orders 0 to 6 at points of the unit sphere about the map's place.
+fn harmonics(room: &LitRoom, map: &MapImage, count: u32) -> Result<Vec<Harmonics>> {
+    let points: Vec<GatherPoint> = LitRoom::points(DVec3::ZERO, count)
+        .into_iter()
+        .map(|point| GatherPoint {
+            position: DVec3::ZERO,
+            ..point
+        })
+        .collect();
+    let exact: Vec<f64> = points.iter().map(|point| room.irradiance(point)).collect();
+    let mean = exact.iter().sum::<f64>() / exact.len().max(1) as f64;
+    let row = |order: u32| {
+        let light = HarmonicLight::new(map, order)?;
+        let found: Vec<f64> = points.iter().map(|point| light.irradiance(point.axis).x).collect();
+        let worst = found
+            .iter()
+            .zip(&exact)
+            .fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
+        Ok(Harmonics {
+            order: order.into(),
+            numbers: light.numbers() as u64,
+            off: relative_errors(&found, &exact)[0],
+            worst: 100.0 * worst / mean,
+        })
+    };
+    [0, 1, 2, 4, 6].into_iter().map(row).collect()
+}
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "wider lobes blur more: deviation over that of the next narrower one",
+        Bound::AtMost(0.95),
+        |row: &Row| row.of_narrower.unwrap_or(f64::NAN).into(),
+    )
+    .among(|row| row.of_narrower.is_some())
+    .in_every_form(),
+    Criterion::each(
+        "no light is lost: mean over that of the map",
+        Bound::Between(0.98, 1.02),
+        |row: &Row| row.mean.into(),
+    )
+    .because("a texel of the bright patch is a third as wide as it, and lobes are scaled to one"),
+    Criterion::each(
+        "the widest is the irradiance: RMS against the exact one (%)",
+        Bound::AtMost(2.0),
+        |row: &Row| row.off.unwrap_or(f64::NAN).into(),
+    )
+    .among(|row| row.off.is_some())
+    .because("a texel has one direction"),
+];
+
+/// Mean and deviation over all directions.
+fn statistics(map: &MapImage) -> [f64; 2] {
+    let (kind, size) = (map.map(), map.size());
+    let moments = |f: &dyn Fn(f64) -> f64| {
+        let of = |texel| kind.texel_solid_angle(size, texel) * f(f64::from(map.at(texel).x));
+        kind.texels(size).map(of).sum::<f64>() / (4.0 * PI)
+    };
+    let mean = moments(&|value| value);
+    [mean, moments(&|value| (value - mean) * (value - mean)).sqrt()]
+}
+
+/// All faces beside each other in one square of rows and columns: +x, −x, +y above, −y, +z, −z in the middle.
+fn unfolded(map: &MapImage, brightest: f64) -> Vec<DVec3> {
+    let side = map.size().x;
+    let whole = 3 * side;
+    let at = |i: u32| {
+        let (x, y) = (i % whole, i / whole);
+        let layer = 3 * (y / side) + x / side;
+        if y >= 2 * side {
+            return DVec3::ZERO;
+        }
+        let texel = (layer * side + y % side) * side + x % side;
+        map.texels()[texel as usize].as_dvec3() / brightest
+    };
+    (0..whole * whole).map(at).collect()
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let [from, to] = context.pick(SIDES, [8, 4]);
+        let room = LitRoom::PUBLISHED;
+        let (radiance, _) = room.maps(Parametrization::Cube, from)?;
+        let [of_map, _] = statistics(&radiance);
+        let mut shown = Vec::new();
+        let mut last = None;
+        let rows = context.each(
+            &ALPHAS,
+            |alpha| format!("alpha {alpha}"),
+            |alpha| {
+                let map = prefilter_ggx(&radiance, UVec2::splat(to), *alpha)?;
+                let [mean, deviation] = statistics(&map);
+                let of_narrower = last.replace(deviation).map(|narrower: f64| deviation / narrower);
+                let brightest = map.texels().iter().fold(0.0f32, |most, texel| most.max(texel.x));
+                let off = (*alpha == 1.0).then(|| {
+                    let directions = map.map().texels(map.size()).filter_map(|texel| {
+                        let axis = map.map().texel_direction(map.size(), texel)?;
+                        let position = DVec3::ZERO;
+                        Some((
+                            PI * f64::from(map.at(texel).x),
+                            room.irradiance(&GatherPoint { position, axis }),
+                        ))
+                    });
+                    let (found, exact): (Vec<f64>, Vec<f64>) = directions.unzip();
+                    relative_errors(&found, &exact)[0]
+                });
+                shown.push(unfolded(&map, 2.0 * of_map));
+                Ok(vec![Row {
+                    alpha: *alpha,
+                    exponent: 2.0 / (alpha * alpha) - 2.0,
+                    contrast: deviation / mean,
+                    of_narrower,
+                    mean: mean / of_map,
+                    brightest: f64::from(brightest) / mean,
+                    off,
+                }])
+            },
+        )?;
+        context.picture(PICTURE, &sheet(&shown, 3 * to, ALPHAS.len() as u32));
+        Ok(Self {
+            maps: rows,
+            harmonics: harmonics(&room, &radiance, context.pick(400, 20))?,
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let widest = self.maps.iter().find(|row| row.alpha == 1.0);
+        let findings = Findings::of(&self.maps, CRITERIA)
+            .headline(
+                "RMS of the widest lobe against the exact irradiance (%)",
+                widest.and_then(|row| row.off).map(Into::into),
+            )
+            .note("A cube of 32² texels a face of a room with walls of different radiance and a bright patch, seen from its middle, convolved into 16² texels a face.")
+            .and(Findings::of(&self.harmonics, OF_HARMONICS).note("Of the same map, in place of a convolved one; the third and the fifth order add nothing to irradiance."))
+            .curves(
+                "contrast",
+                "What is left of the room's contrast",
+                Axes::rates("width of the lobe (GGX alpha)", "deviation over the mean"),
+                curves(&self.maps, |_| "lit room".into(), |row| (row.alpha, row.contrast.into())),
+            );
+        if self.maps.is_empty() {
+            return findings;
+        }
+        findings.picture(
+            PICTURE,
+            "Faces +x, −x, +y and −y, +z, −z of the convolved maps, from narrow lobes to the cosine",
+        )
+    }
+}

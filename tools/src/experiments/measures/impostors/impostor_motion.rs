@@ -1,0 +1,148 @@
+//! A mirror sphere that moves while its map stays where it was: errors of look-ups over the way, into the corner of an empty room and beside a box.
+//!
+//! Oracle: exact rays. Distances are exact, too: what is off is the search, and what the map's place does not see.
+
+use clerestory::Result;
+use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
+use clerestory::maps::impostor::{ImpostorSettings, SearchMethod};
+use glam::DVec3;
+
+use super::exact_room::{errors, mean};
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, largest, rows};
+use crate::experiments::measures::Context;
+
+/// Pixels along a side of a view of the sphere.
+const SIDE: u32 = 220;
+/// Even steps of the way from the map's place to the corner.
+const STEPS: u32 = 10;
+/// Stages of the pictures that were published: the map alone, one step, one step and further ones.
+const STAGES: [(SearchMethod, u32); 6] = [
+    (SearchMethod::Classical, 0),
+    (SearchMethod::SecantFromGuess, 0),
+    (SearchMethod::FalsePosition, 1),
+    (SearchMethod::FalsePosition, 3),
+    (SearchMethod::FalsePosition, 8),
+    (SearchMethod::Hybrid, 3),
+];
+
+rows! {
+    /// A look-up at a place of the way.
+    struct Row = "Errors of look-ups while the sphere moves away from its map's place" by [room, share, way] {
+        room: String = "room",
+        share: f64 = "share of the way",
+        way: String = "look-up",
+        mean: f64 = "mean error (°)",
+        published: Option<f64> = "published mean (°)",
+        good: f64 = "rays below 1° (%)",
+        largest: f64 = "largest (°)",
+    }
+}
+/// What was found.
+pub type Found = Vec<Row>;
+
+const EMPTY: &str = "empty";
+const BOX: &str = "with a box";
+
+const CRITERIA: &[Criterion<Row>] = &[
+    Criterion::each(
+        "both ends are as published: difference over a fifth of it",
+        Bound::AtMost(1.0),
+        |row: &Row| {
+            let published = row.published.unwrap_or(f64::NAN);
+            ((row.mean - published).abs() / (0.2 * published)).into()
+        },
+    )
+    .among(|row| row.published.is_some()),
+    Criterion::each(
+        "three steps keep up with the sphere all the way: mean error (°)",
+        Bound::AtMost(1.0),
+        |row: &Row| row.mean.into(),
+    )
+    .among(|row| row.room == EMPTY && row.way.ends_with("+3"))
+    .in_every_form(),
+    Criterion::each(
+        "the map alone is off from the beginning: mean error (°)",
+        Bound::AtLeast(9.0),
+        |row: &Row| row.mean.into(),
+    )
+    .among(|row| row.room == EMPTY && row.way == way(SearchMethod::Classical, 0))
+    .because("a sphere about the map's place is off by 9.75°"),
+    Criterion::each(
+        "what the box hides stays smeared after eight steps: rays below 1° (%)",
+        Bound::AtMost(99.0),
+        |row: &Row| row.good.into(),
+    )
+    .among(|row| row.room == BOX && row.way == way(SearchMethod::FalsePosition, 8) && row.share == 1.0)
+    .because("2 % of the rays of a slightly smaller sphere meet what the map's place does not see"),
+];
+
+fn way(method: SearchMethod, steps: u32) -> String {
+    format!("{method} +{steps}")
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let side = context.pick(SIDE, 16);
+        let steps = context.pick(STEPS, 2);
+        let places: Vec<(BoxRoom, u32)> = [BoxRoom::EMPTY, BoxRoom::BOX]
+            .into_iter()
+            .flat_map(|room| (0..=steps).map(move |i| (room, i)))
+            .collect();
+        let name = |(room, i): &(BoxRoom, u32)| format!("{}, place {i}", name_of(*room));
+        context.each(&places, name, |(room, i)| {
+            let share = f64::from(*i) / f64::from(steps);
+            let sphere = ShinySphere {
+                room: *room,
+                centre: share * end_of(*room),
+                ..ShinySphere::A
+            };
+            let rays = sphere.rays(side, None);
+            let row = |(method, steps): (SearchMethod, u32)| {
+                let found = errors(&sphere, &rays, &ImpostorSettings::of(method, steps));
+                let is_published = room.obstacle.is_none() && method == SearchMethod::Classical;
+                let published = (share == 0.0).then_some(9.75).or((share == 1.0).then_some(30.88));
+                Row {
+                    room: name_of(*room).into(),
+                    share,
+                    way: way(method, steps),
+                    mean: mean(&found),
+                    published: published.filter(|_| is_published),
+                    good: 100.0 * found.iter().filter(|error| **error < 1.0).count() as f64 / found.len().max(1) as f64,
+                    largest: found.iter().copied().fold(0.0, f64::max),
+                }
+            };
+            Ok(STAGES.map(row).into())
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let of_room = |room: &str| -> Vec<Row> { self.iter().filter(|row| row.room == room).cloned().collect() };
+        let axes = Axes::rates("share of the way, and a tenth", "mean error (°)");
+        let at = |row: &Row| (row.share + 0.1, row.mean.max(1e-5).into());
+        let is_three = |row: &Row| row.room == EMPTY && row.way == way(SearchMethod::FalsePosition, 3);
+        Findings::of(self, CRITERIA)
+            .headline(
+                "the largest mean error of three steps over the way (°)",
+                largest(self, is_three, |row| row.mean),
+            )
+            .note(
+                "A sphere of radius 0.3 moves from the middle of a room of half width 1, where its map is seen from, to (0.55, −0.6, 0.55), and beside a box to (0.5, −0.2, −0.35); it is seen from one place. Published are the ends of the way in the empty \
+                 room, and pictures of each look-up.",
+            )
+            .curves("empty", "Errors in an empty room", axes, curves(&of_room(EMPTY), |row| row.way.clone(), at))
+            .curves("box", "Errors in a room with a box", axes, curves(&of_room(BOX), |row| row.way.clone(), at))
+    }
+}
+
+/// Where the sphere comes to: a corner, or a place beside the box.
+const fn end_of(room: BoxRoom) -> DVec3 {
+    if room.obstacle.is_some() {
+        ShinySphere::BOX.centre
+    } else {
+        ShinySphere::C.centre
+    }
+}
+
+fn name_of(room: BoxRoom) -> &'static str {
+    if room.obstacle.is_some() { BOX } else { EMPTY }
+}

@@ -1,0 +1,482 @@
+//! What three channels, and each form of the Fresnel factor in them, lose of metals' spectra, beside what they cost; indices of metals over wavelengths.
+//!
+//! Oracle: the same picture in 41 bins of wavelengths, whose sum a test holds to a closed form. The scene is a half pipe of the metal under a white sky, seen from above: each ray is
+//! reflected once or more often, from normal to grazing incidence, and comes to the same radiance, so that pictures have no noise but that of pixels' places, which is common to all.
+
+use std::f64::consts::PI;
+
+use clerestory::Result;
+use clerestory::film::picture::RADIANCE;
+use clerestory::gpu::Gpu;
+use clerestory::render::spectral::{SpectralMetal, render_spectral};
+use clerestory::render::{RenderOptions, render};
+use clerestory::scene::metals::bins::Bins;
+use clerestory::scene::metals::{self, IndexSpectrum};
+use clerestory::scene::{Camera, Environment, FresnelForm, Material, Mesh, Projection, Scene};
+use clerestory::techniques::PathTracerSettings;
+use clerestory::transport::fresnel::curve::{CurveForm, FresnelCurve};
+use clerestory::transport::fresnel::extinction::{wave_envelope, wave_field};
+use glam::{DVec3, Vec3};
+
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, curves, largest, rows};
+use crate::experiments::measures::Context;
+use crate::metal_forms::sheet;
+
+/// The engine's nine metals.
+const METALS: [&str; 9] = [
+    "copper",
+    "gold",
+    "silver",
+    "aluminium",
+    "iron",
+    "chromium",
+    "titanium",
+    "nickel",
+    "cobalt",
+];
+/// A metal of one index at all wavelengths.
+const GREY: &str = "grey";
+/// Bins of the oracle.
+const ORACLE: u32 = 41;
+/// Wavelengths in the place of red, green and blue, nm.
+const WAVELENGTHS: [f64; 3] = [700.0, 550.0, 435.0];
+/// Evaluations of an invocation whose time is taken.
+const CHAIN: u32 = 64;
+const TURNS: usize = 9;
+const PICTURE: &str = "troughs.png";
+/// Facets of the half pipe.
+const FACETS: u32 = 64;
+/// How far from the middle the half pipe of radius 1 is seen: beyond, light is reflected very often.
+const SEEN: f32 = 0.95;
+
+rows! {
+    /// A way to make a metal's picture.
+    struct Row = "Spectral errors of metals, and their cost" by [metal, way] {
+        metal: String = "metal",
+        way: String = "way",
+        pictures: u64 = "pictures",
+        cost: Repeats = "evaluations of a Fresnel factor for all pictures (ns)",
+        error: f64 = "RMS error over the mean (%)",
+        worst: f64 = "greatest error of a pixel's channel",
+        red: f64 = "mean error, red",
+        green: f64 = "mean error, green",
+        blue: f64 = "mean error, blue",
+        over_channels: Option<f64> = "RMS error over that of the exact factor in channels",
+    }
+}
+
+rows! {
+    /// A metal at a wavelength.
+    struct Index = "Indices of metals" by [metal, wavelength] {
+        metal: String = "metal",
+        wavelength: f64 = "wavelength (nm)",
+        n: f64 = "n",
+        k: f64 = "k",
+    }
+}
+
+rows! {
+    /// A place inside a material with n = 1.2, at 400 nm.
+    struct Wave = "Waves inside a material" by [extinction, depth] {
+        extinction: f64 = "k",
+        depth: f64 = "depth (nm)",
+        field: f64 = "field",
+        envelope: f64 = "envelope",
+        published: Option<f64> = "published envelope",
+    }
+}
+
+/// What was found.
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    errors: Vec<Row>,
+    indices: Vec<Index>,
+    waves: Vec<Wave>,
+}
+
+/// The exact factor in channels: what the engine does unless it is told otherwise.
+const CHANNELS: &str = "exact";
+
+const OF_ERRORS: &[Criterion<Row>] = &[
+    Criterion::each(
+        "eight bins: the greatest error of a pixel's channel",
+        Bound::AtMost(0.03),
+        |row: &Row| row.worst.into(),
+    )
+    .among(|row| row.way == bins_name(8))
+    .because("four reflections at normal incidence are off by 0.021"),
+    Criterion::each(
+        "sixteen bins: the greatest error of a pixel's channel",
+        Bound::AtMost(0.006),
+        |row: &Row| row.worst.into(),
+    )
+    .among(|row| row.way == bins_name(16))
+    .because("four reflections at normal incidence are off by 0.003"),
+    Criterion::each(
+        "a metal of one index has no error in channels and in bins",
+        Bound::AtMost(1e-5),
+        |row: &Row| row.worst.into(),
+    )
+    .among(|row| row.metal == GREY && (row.way == CHANNELS || row.way.ends_with("bins")))
+    .in_every_form(),
+    Criterion::each(
+        "channels lose copper's edge where it is met more than once: the greatest error",
+        Bound::AtLeast(0.04),
+        |row: &Row| row.worst.into(),
+    )
+    .among(|row| row.metal == "copper" && row.way == CHANNELS)
+    .because("two reflections at normal incidence are off by 0.043 in red"),
+    Criterion::each(
+        "channels keep metals without an edge: the greatest error",
+        Bound::AtMost(0.006),
+        |row: &Row| row.worst.into(),
+    )
+    .among(|row| !["copper", "gold", GREY].contains(&row.metal.as_str()) && row.way == CHANNELS)
+    .because("four reflections at normal incidence are off by 0.0034 at most"),
+    Criterion::each(
+        "sixteen bins bring what channels lose: RMS error over that of channels",
+        Bound::AtMost(0.2),
+        |row: &Row| row.over_channels.unwrap_or(f64::INFINITY).into(),
+    )
+    .among(|row| ["copper", "gold"].contains(&row.metal.as_str()) && row.way == bins_name(16)),
+    Criterion::each(
+        "Schlick's curve without k has the wrong colour: the greatest error for copper",
+        Bound::AtLeast(0.3),
+        |row: &Row| row.worst.into(),
+    )
+    .among(|row| row.metal == "copper" && row.way == FresnelForm::Schlick.name())
+    .because("its green and blue reflect 0.6 and 0.5, where the curve has next to nothing"),
+];
+const OF_WAVES: &[Criterion<Wave>] = &[Criterion::each(
+    "envelopes are the published ones: their difference",
+    Bound::AtMost(5e-4),
+    |row: &Wave| (row.envelope - row.published.unwrap_or(f64::NAN)).abs().into(),
+)
+.among(|row| row.published.is_some())
+.in_every_form()];
+
+fn bins_name(count: u32) -> String {
+    format!("{count} bins")
+}
+
+/// A way to make a picture.
+#[derive(Debug, Clone, Copy)]
+enum Way {
+    /// A form in channels.
+    Channels(FresnelForm),
+    /// The exact factor at three wavelengths.
+    Wavelengths,
+    /// The exact factor in so many bins.
+    Bins(u32),
+}
+
+impl Way {
+    fn name(self) -> String {
+        match self {
+            Self::Channels(form) => form.name().into(),
+            Self::Wavelengths => "three wavelengths".into(),
+            Self::Bins(count) => bins_name(count),
+        }
+    }
+
+    const fn pictures(self) -> u32 {
+        match self {
+            Self::Channels(_) | Self::Wavelengths => 1,
+            Self::Bins(count) => count.div_ceil(3),
+        }
+    }
+
+    /// What a device evaluates.
+    const fn curve(self) -> CurveForm {
+        match self {
+            Self::Channels(form) => match form {
+                FresnelForm::Exact => CurveForm::Exact,
+                FresnelForm::Schlick | FresnelForm::Rescaled => CurveForm::RescaledF0,
+                FresnelForm::Compensated => CurveForm::CompensatedF0,
+                FresnelForm::F82Tint | FresnelForm::Hoffman => CurveForm::Tinted,
+                FresnelForm::Simplified => CurveForm::Simplified,
+            },
+            Self::Wavelengths | Self::Bins(_) => CurveForm::Exact,
+        }
+    }
+
+    /// All pixels of the metal's half pipe.
+    fn picture(self, gpu: &Gpu, spectrum: &IndexSpectrum, options: &RenderOptions) -> Result<Vec<DVec3>> {
+        let mut scene = half_pipe();
+        if let Some(material) = scene.materials.first_mut() {
+            material.conductor = Some(match self {
+                Self::Wavelengths => spectrum.at_wavelengths(WAVELENGTHS),
+                _ => spectrum.channels(),
+            });
+            if let Self::Channels(form) = self {
+                material.fresnel = form;
+            }
+        }
+        let picture = match self {
+            Self::Bins(count) => {
+                let metal = SpectralMetal {
+                    material: 0,
+                    spectrum: spectrum.clone(),
+                };
+                render_spectral(gpu, &scene, &[metal], &Bins::new(count)?, options)?.picture
+            }
+            _ => render(gpu, &scene, options)?.picture,
+        };
+        let pixels = picture.require(RADIANCE)?.pixels();
+        Ok(pixels.map(|pixel| Vec3::from_array(pixel).as_dvec3()).collect())
+    }
+}
+
+/// A half pipe of radius 1 under a white sky, whose one material is a mirror.
+fn half_pipe() -> Scene {
+    let mut scene = Scene::default();
+    let metal = scene.add_material(Material::mirror("metal", Vec3::ONE));
+    let edge = |z: f32| {
+        (0..=FACETS).map(move |i| {
+            let angle = PI * f64::from(i) / f64::from(FACETS);
+            Vec3::new(-angle.cos() as f32, 1.0 - angle.sin() as f32, z)
+        })
+    };
+    let other = FACETS + 1;
+    let facet = |i: u32| [[i, i + other, i + 1], [i + 1, i + other, i + other + 1]];
+    scene.place(Mesh {
+        name: "half pipe".into(),
+        positions: edge(-2.0).chain(edge(2.0)).collect(),
+        triangles: (0..FACETS).flat_map(facet).collect(),
+        material: Some(metal),
+        ..Mesh::default()
+    });
+    scene.environment = Some(Environment::uniform(Vec3::ONE));
+    scene.cameras.push(Camera {
+        // Square pixels: the picture is as many times wider than high as the half pipe's part that is seen.
+        projection: Projection::Orthographic {
+            half_height: SEEN / ASPECT as f32,
+        },
+        ..Camera::look_at("main", DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, DVec3::NEG_Z, 1.0)
+    });
+    scene
+}
+
+/// Width over height of pictures.
+const ASPECT: u32 = 16;
+
+fn spectrum_of(metal: &str) -> Result<IndexSpectrum> {
+    let grey = || IndexSpectrum::parse("380 1.4 6.2\n780 1.4 6.2");
+    metals::spectrum(metal).map_or_else(
+        || grey().map_err(|cause| clerestory::Error::setting("metal", metal, cause)),
+        Ok,
+    )
+}
+
+/// The error of a way against the oracle's pixels, without its cost.
+fn row(metal: &str, way: Way, cost: Repeats, pixels: &[DVec3], oracle: &[DVec3]) -> Row {
+    let count = oracle.len().max(1) as f64;
+    let differences: Vec<DVec3> = pixels
+        .iter()
+        .zip(oracle)
+        .map(|(pixel, oracle)| *pixel - *oracle)
+        .collect();
+    let mean = oracle.iter().copied().sum::<DVec3>().element_sum() / (3.0 * count);
+    let square: f64 = differences.iter().map(|gap| gap.length_squared()).sum::<f64>() / (3.0 * count);
+    let bias = differences.iter().copied().sum::<DVec3>() / count;
+    Row {
+        metal: metal.into(),
+        way: way.name(),
+        pictures: way.pictures().into(),
+        cost,
+        error: 100.0 * square.sqrt() / mean,
+        worst: differences
+            .iter()
+            .fold(0.0, |worst, gap| worst.max(gap.abs().max_element())),
+        red: bias.x,
+        green: bias.y,
+        blue: bias.z,
+        over_channels: None,
+    }
+}
+
+fn waves(steps: u32) -> Vec<Wave> {
+    const PUBLISHED: [(f64, f64, f64); 4] = [
+        (0.1, 100.0, 0.855),
+        (0.1, 1000.0, 0.208),
+        (0.5, 100.0, 0.456),
+        (0.5, 400.0, 0.0432),
+    ];
+    let at = |k: f64, i: u32| {
+        let depth = 1000.0 * f64::from(i) / f64::from(steps);
+        let published = PUBLISHED.iter().find(|(of, place, _)| *of == k && *place == depth);
+        Wave {
+            extinction: k,
+            depth,
+            field: wave_field(1.2, k, 400.0, depth),
+            envelope: wave_envelope(k, 400.0, depth),
+            published: published.map(|(.., envelope)| *envelope),
+        }
+    };
+    [0.0, 0.1, 0.5]
+        .into_iter()
+        .flat_map(|k| (0..=steps).map(move |i| at(k, i)))
+        .collect()
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let forms = context.first(&FresnelForm::ALL, 2);
+        let counts = context.pick(vec![8, 12, 16, 24], vec![8]);
+        let oracle = Way::Bins(context.pick(ORACLE, 12));
+        let ways: Vec<Way> = (forms.iter().map(|form| Way::Channels(*form)))
+            .chain([Way::Wavelengths])
+            .chain(counts.into_iter().map(Way::Bins))
+            .collect();
+        let metals: Vec<&str> = context
+            .pick(METALS.to_vec(), vec![])
+            .into_iter()
+            .chain([GREY])
+            .collect();
+        let width = context.pick(64, ASPECT);
+        let options = RenderOptions {
+            size: [width, width / ASPECT],
+            spp: context.pick(16, 1),
+            settings: PathTracerSettings {
+                // Without roulette: paths end in the sky.
+                roulette_start: 64,
+                ..PathTracerSettings::default()
+            }
+            .into(),
+            ..RenderOptions::default()
+        };
+        let costs = costs(context, &gpu, &ways)?;
+        let mut shown = Vec::new();
+        let errors = context.each(
+            &metals,
+            |metal| (*metal).into(),
+            |metal| {
+                let spectrum = spectrum_of(metal)?;
+                let truth = oracle.picture(&gpu, &spectrum, &options)?;
+                let mut rows = Vec::with_capacity(ways.len());
+                shown.push(truth.clone());
+                for (way, cost) in ways.iter().zip(&costs) {
+                    let pixels = way.picture(&gpu, &spectrum, &options)?;
+                    let cost = cost.scaled(f64::from(way.pictures()));
+                    rows.push(row(metal, *way, cost, &pixels, &truth));
+                    if matches!(
+                        way,
+                        Way::Channels(FresnelForm::Exact | FresnelForm::Schlick | FresnelForm::Rescaled)
+                    ) {
+                        shown.push(pixels);
+                    }
+                }
+                let of_channels = rows.iter().find(|row| row.way == CHANNELS).map_or(0.0, |row| row.error);
+                for row in &mut rows {
+                    row.over_channels = (of_channels > 0.0).then(|| row.error / of_channels);
+                }
+                Ok(rows)
+            },
+        )?;
+        let squares: Vec<Vec<DVec3>> = shown.iter().map(|pixels| square(pixels, width)).collect();
+        context.picture(PICTURE, &sheet(&squares, width, (forms.len() as u32).min(3) + 1));
+        let mut indices = Vec::new();
+        for metal in context.first(&METALS, 2) {
+            let spectrum = spectrum_of(metal)?;
+            for wavelength in Bins::new(context.pick(ORACLE, 8))?.wavelengths() {
+                let [n, k] = spectrum.at(*wavelength);
+                indices.push(Index {
+                    metal: (*metal).into(),
+                    wavelength: *wavelength,
+                    n,
+                    k,
+                });
+            }
+        }
+        Ok(Self {
+            errors,
+            indices,
+            waves: waves(context.pick(50, 10)),
+        })
+    }
+
+    fn findings(&self) -> Findings {
+        let drawn: Vec<Row> = self
+            .errors
+            .iter()
+            .filter(|row| row.error > 0.0 && row.metal != GREY)
+            .cloned()
+            .collect();
+        let is_channels = |row: &Row| row.way == CHANNELS && row.metal != GREY;
+        let findings = Findings::of(&self.errors, OF_ERRORS)
+            .headline(
+                "the greatest error of a metal in channels (RMS over the mean, %)",
+                largest(&self.errors, is_channels, |row| row.error),
+            )
+            .note(
+                "Channels are means of n and k over what red, green and blue are sensitive to; ways without a number of bins are in channels, but for the three wavelengths 700, 550 and \
+                 435 nm. Errors are those of the picture in 41 bins, white being 1, over all pixels of a half pipe seen from above. The cost is that of three bands' Fresnel factor on the device in a chain of 64, times \
+                 the number of pictures; all else that a picture takes is multiplied alike.",
+            )
+            .and(Findings::of(&self.indices, &[]).long())
+            .and(Findings::of(&self.waves, OF_WAVES).long())
+            .curves(
+                "error-and-cost",
+                "Spectral error and cost of every metal and form",
+                Axes::rates("Fresnel factors of all pictures (ns)", "RMS error over the mean (%)"),
+                curves(&drawn, |row| row.metal.clone(), |row| (row.cost.measured().value, row.error.into())),
+            )
+            .curves(
+                "n-and-k",
+                "Indices of metals from 400 to 700 nm",
+                Axes::rates("n", "k"),
+                curves(&self.indices, |row| row.metal.clone(), |row| (row.n, row.k.into())),
+            )
+            .curves(
+                "n",
+                "Real part of the index over wavelengths",
+                Axes::rates("wavelength (nm)", "n"),
+                curves(&self.indices, |row| row.metal.clone(), |row| (row.wavelength, row.n.into())),
+            )
+            .curves(
+                "k",
+                "Extinction over wavelengths",
+                Axes::rates("wavelength (nm)", "k"),
+                curves(&self.indices, |row| row.metal.clone(), |row| (row.wavelength, row.k.into())),
+            )
+            .curves(
+                "envelopes",
+                "Amplitude of waves inside a material at 400 nm",
+                Axes::even("depth (nm)", "envelope", 1.0, (10, 100.0)),
+                curves(&self.waves, |row| format!("k = {}", row.extinction), |row| (row.depth, row.envelope.into())),
+            );
+        if self.errors.is_empty() {
+            return findings;
+        }
+        findings.picture(
+            PICTURE,
+            "Half pipes of each metal from above: in 41 bins, by the exact factor, by Schlick's curve, by the rescaled one",
+        )
+    }
+}
+
+/// Seconds, in nanoseconds, of an evaluation of three bands by each way's form.
+fn costs(context: &Context<'_>, gpu: &Gpu, ways: &[Way]) -> Result<Vec<Repeats>> {
+    let count = context.pick(1 << 16, 1 << 8);
+    let ior = spectrum_of("gold")?.channels();
+    let kernels: Vec<FresnelCurve> = ways
+        .iter()
+        .map(|way| FresnelCurve::new(gpu, way.curve(), &ior, CHAIN))
+        .collect::<Result<_>>()?;
+    let evaluations = f64::from(count) * f64::from(CHAIN);
+    let times = context.in_turns(TURNS, kernels.len(), |i| {
+        Ok(1e9 * kernels[i].run(gpu, count)?.1 / evaluations)
+    })?;
+    Ok(times.into_iter().map(Repeats).collect())
+}
+
+/// A picture's first row as a square of stripes.
+fn square(pixels: &[DVec3], side: u32) -> Vec<DVec3> {
+    let row = pixels.get(..side as usize).unwrap_or(pixels);
+    row.iter()
+        .copied()
+        .cycle()
+        .take(side as usize * side as usize)
+        .collect()
+}
