@@ -13,8 +13,7 @@ struct LightCone {
     float reach;   // greatest angle between a normal and a direction that its light takes, in [0, pi]
 };
 
-// A cone that holds two others; the least one where neither axis is opposite to the other. Without a branch: software drivers have written for lanes that had
-// left a kernel behind a function of several returns.
+// A cone that holds two others; the least one where neither axis is opposite to the other.
 LightCone cone_union(LightCone a, LightCone b) {
     bool swaps = b.spread > a.spread;
     vec3 axis = swaps ? b.axis : a.axis;
