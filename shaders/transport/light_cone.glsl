@@ -15,27 +15,24 @@ struct LightCone {
 
 // A cone that holds two others; the least one where neither axis is opposite to the other.
 LightCone cone_union(LightCone a, LightCone b) {
-    if (b.spread > a.spread) {
-        LightCone wide = b;
-        b = a;
-        a = wide;
-    }
-    float reach = max(a.reach, b.reach);
-    vec3 pivot = cross(a.axis, b.axis);
+    bool swaps = b.spread > a.spread;
+    vec3 axis = swaps ? b.axis : a.axis;
+    vec3 other = swaps ? a.axis : b.axis;
+    float wide = max(a.spread, b.spread);
+    float narrow = min(a.spread, b.spread);
+    vec3 pivot = cross(axis, other);
     float sine = length(pivot);
-    float cosine = dot(a.axis, b.axis);
+    float cosine = dot(axis, other);
     float angle = atan(sine, cosine);
-    if (min(angle + b.spread, PI) <= a.spread) {
-        return LightCone(a.axis, a.spread, reach);
-    }
-    float spread = 0.5 * (a.spread + angle + b.spread);
-    if (spread >= PI || sine < LIGHT_CONE_PARALLEL) {
-        // Axes that are equal but for rounding differ by less than any slack.
-        return LightCone(a.axis, spread < PI && cosine > 0.0 ? a.spread : PI, reach);
-    }
-    float turn = spread - a.spread;
-    vec3 across = cross(pivot / sine, a.axis);
-    return LightCone(normalize(a.axis * cos(turn) + across * sin(turn)), spread, reach);
+    bool holds = min(angle + narrow, PI) <= wide;
+    float spread = 0.5 * (wide + angle + narrow);
+    // Axes that are equal but for rounding differ by less than any slack.
+    bool keeps = spread >= PI || sine < LIGHT_CONE_PARALLEL;
+    float kept = spread < PI && cosine > 0.0 ? wide : PI;
+    float turn = spread - wide;
+    vec3 across = cross(pivot / max(sine, LIGHT_CONE_PARALLEL), axis);
+    vec3 turned = normalize(axis * cos(turn) + across * sin(turn));
+    return LightCone(holds || keeps ? axis : turned, holds ? wide : (keeps ? kept : spread), max(a.reach, b.reach));
 }
 
 #endif

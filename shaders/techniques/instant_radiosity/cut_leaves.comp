@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 #include "transport/luminance.glsl"
 
 layout(set = 0, binding = 0) uniform utextureBuffer virtual_light_texels;
-layout(set = 0, binding = 1) uniform utextureBuffer light_order;
+layout(set = 0, binding = 1) uniform utextureBuffer light_order;  // four words a texel
 layout(set = 0, binding = 2, scalar) restrict writeonly buffer LightNodes { SceneLightNode light_nodes[]; };
 
 layout(push_constant, scalar) uniform Push {
@@ -22,6 +22,7 @@ layout(push_constant, scalar) uniform Push {
     uint nodes;   // of the tree
 } push;
 
+const uint LIGHTS_A_TEXEL = 4u;
 // Whether light leaves a surface to the side that it came from alone, about the geometric normal; else to all sides.
 const bool STAYS_ON_ITS_SIDE = !HAS_TRANSMISSION && !HAS_SHADING_NORMALS && !HAS_NORMAL_MAPS;
 
@@ -30,7 +31,7 @@ void main() {
     if (leaf >= push.lights) {
         return;
     }
-    uint number = texelFetch(light_order, int(leaf)).x;
+    uint number = texelFetch(light_order, int(leaf / LIGHTS_A_TEXEL))[leaf % LIGHTS_A_TEXEL];
     int quarter = int(VIRTUAL_LIGHT_QUARTERS * number);
     VirtualLight light = unpack_virtual_light(texelFetch(virtual_light_texels, quarter), texelFetch(virtual_light_texels, quarter + 1),
                                               texelFetch(virtual_light_texels, quarter + 2), texelFetch(virtual_light_texels, quarter + 3));

@@ -20,16 +20,15 @@ layout(push_constant, scalar) uniform Push {
 
 void main() {
     uint place = gl_GlobalInvocationID.x;
-    if (place >= push.count) {
-        return;
+    if (place < push.count) {
+        uint child = push.first + place + push.first + place + 1u;
+        bool has_both = 2u * place + 1u < push.children;
+        SceneLightNode first = light_nodes[child];
+        SceneLightNode node = light_node_union(first, light_nodes[has_both ? child + 1u : child]);
+        // A child that is alone has been joined with itself.
+        node.strength = has_both ? node.strength : first.strength;
+        node.share = has_both ? 0.0 : 1.0;
+        node.child = child;
+        light_nodes[push.first + place] = node;
     }
-    uint child = push.first + place + push.first + place + 1u;
-    bool has_both = 2u * place + 1u < push.children;
-    SceneLightNode node = light_nodes[child];
-    if (has_both) {
-        node = light_node_union(node, light_nodes[child + 1u]);
-    }
-    node.share = has_both ? 0.0 : 1.0;
-    node.child = child;
-    light_nodes[push.first + place] = node;
 }

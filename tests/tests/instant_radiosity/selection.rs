@@ -48,7 +48,7 @@ fn cuts_agree_with_all_lights() {
     with_gpu(|gpu| {
         let scene = room();
         let reference = traced(gpu, &scene, 2048);
-        for (cut_size, count) in [(1, 96), (6, 64)] {
+        for (cut_size, count) in [(1, 48), (6, 32)] {
             let base = VirtualLightSettings {
                 walks: 32,
                 samples_per_pass: 4,
@@ -88,9 +88,9 @@ fn candidates_have_the_same_mean_and_less_noise() {
             selection: Selection::All,
             ..with(1)
         };
-        let all = passes(gpu, &scene, &all, 64);
+        let all = passes(gpu, &scene, &all, 32);
         let of = |candidates: u32| {
-            let some = passes(gpu, &scene, &with(candidates), 64);
+            let some = passes(gpu, &scene, &with(candidates), 32);
             for channel in 0..3 {
                 let differences = some.means[channel].iter().zip(&all.means[channel]).map(|(a, b)| a - b);
                 let differences: Vec<f64> = differences.collect();
@@ -111,7 +111,7 @@ fn candidates_have_the_same_mean_and_less_noise() {
         };
         let ((one, counts), (six, more_counts)) = (of(1), of(6));
         println!("squares {one} and {six}");
-        assert!(six < 0.6 * one, "{six} {one}");
+        assert!(six < 0.8 * one, "{six} {one}");
         // As many gathers, six times the connections, and no more shadow rays than nodes.
         assert_eq!(more_counts.gathers, counts.gathers);
         assert_eq!(more_counts.connections, 6 * counts.connections);
@@ -270,7 +270,7 @@ fn trees_hold_every_light_once_and_nodes_what_is_below() {
                     }
                 };
                 let near =
-                    |a: f32, b: f32| assert!((a - b).abs() <= 1e-4 * b.abs().max(1.0), "{i}: {node:?} {around:?}");
+                    |a: f32, b: f32| assert!((a - b).abs() <= 1e-3 * b.abs().max(1.0), "{i}: {node:?} {around:?}");
                 near(node.strength, around.strength);
                 near(node.radius, around.radius);
                 near(node.cos_spread, around.cos_spread);

@@ -164,6 +164,7 @@ const CUT_LIGHTS: u32 = 77;
 fn unions_agree_with_their_twins() {
     with_gpu(|gpu| {
         let tree = perfect_tree();
+        // Arc cosines of the software driver are off by some of its units.
         let absolute = 4.0 * trigonometric_error(gpu);
         let table = cases(83, |r| {
             let mut cone = || {
@@ -214,7 +215,7 @@ fn unions_agree_with_their_twins() {
             close(result.0[14].into(), around.radius.into(), 1e-4);
             // Wide cones may become all directions by rounding.
             if around.cos_spread > -0.9 {
-                close(result.0[15].into(), around.cos_spread.into(), 16.0 * absolute);
+                close(result.0[15].into(), around.cos_spread.into(), 128.0 * absolute);
             }
         }
     });
