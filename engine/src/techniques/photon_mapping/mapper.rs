@@ -449,12 +449,14 @@ impl PhotonMapper {
 
     /// Radius of the kernels of events in media, m, in a pass; the greatest where they follow footprints.
     pub fn event_radius(&self, pass: u32) -> f64 {
-        self.settings.event_radius(pass, self.diagonal())
+        self.settings
+            .event_radius(pass, self.diagonal(), self.scene.greatest_extinction())
     }
 
     /// How the kernels of events in media are made in a pass.
     pub fn event_kernel(&self, pass: u32) -> EventKernelSettings {
-        self.settings.event_kernel(pass, self.diagonal())
+        self.settings
+            .event_kernel(pass, self.diagonal(), self.scene.greatest_extinction())
     }
 
     /// Of the scene's box, m.

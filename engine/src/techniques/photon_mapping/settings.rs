@@ -19,6 +19,8 @@ use std::f64::consts::PI;
 /// the dampening. A room of 6 m × 6 m × 3 m has a diagonal of 9 m; the source's unit and greatest axis are 1 m.
 const RADIUS_SHARE: f64 = 1.0 / 50.0;
 const UNIT_SHARE: f64 = 1.0 / 9.0;
+/// The radius of fixed kernels in media is this share of the least mean free path at most.
+const PATH_SHARE: f64 = 1.0 / 4.0;
 /// Least photons under a kernel about a point: the last one only says how wide it is.
 const NEIGHBORS_MIN: u32 = 2;
 /// Passes that neighbours must not yet be the least after, to count as shrinking.
@@ -115,7 +117,8 @@ crate::settings! {
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by the size of the scene.
         ///
-        /// 0 stands for a fiftieth of the scene's diagonal for fixed kernels, a ninth for others.
+        /// 0 stands for a fiftieth of the scene's diagonal for fixed kernels, or a quarter of the least mean free path if that is less, and for a ninth of the diagonal for
+        /// others.
         pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
         /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
@@ -216,18 +219,23 @@ impl PhotonSettings {
         }
     }
 
-    /// Radius of the kernels of events in media, m, in a pass, in a scene of that diagonal: the area of disks, the width of beams or the volume of balls falls from pass to pass as
+    /// Radius of the kernels of events in media, m, in a pass, in a scene of that diagonal and greatest extinction, 1/m: the area of disks, the width of beams or the volume of balls falls from pass to pass as
     /// [`reduction`](PhotonSettings::reduction) says.
     ///
     /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011.
-    pub(super) fn event_radius(&self, pass: u32, diagonal: f64) -> f64 {
+    pub(super) fn event_radius(&self, pass: u32, diagonal: f64, extinction: f64) -> f64 {
+        // Within a boundary's reach events lack on one side, which must be little of a mean free path.
+        let by_medium = match self.volume_kernel {
+            VolumeKernel::Fixed if extinction > 0.0 => PATH_SHARE / extinction,
+            _ => f64::INFINITY,
+        };
         let share = match self.volume_kernel {
             VolumeKernel::Fixed => RADIUS_SHARE,
             VolumeKernel::Footprint => UNIT_SHARE,
         };
         let first = match f64::from(self.volume_radius) {
-            0.0 if diagonal > 0.0 => share * diagonal,
-            0.0 => 1.0,
+            0.0 if diagonal > 0.0 => by_medium.min(share * diagonal),
+            0.0 => by_medium.min(1.0),
             set => set,
         };
         first * self.event_shrinkage(pass)
@@ -249,13 +257,16 @@ impl PhotonSettings {
     }
 
     /// Kernels of events in media in a pass, in a scene of that diagonal, m.
-    pub(super) fn event_kernel(&self, pass: u32, diagonal: f64) -> EventKernelSettings {
+    pub(super) fn event_kernel(&self, pass: u32, diagonal: f64, extinction: f64) -> EventKernelSettings {
         let unit_length = match f64::from(self.unit_length) {
             0.0 if diagonal > 0.0 => UNIT_SHARE * diagonal,
             0.0 => 1.0,
             set => set,
         };
-        let (length_max, shrunk) = (self.event_radius(pass, diagonal), self.event_shrinkage(pass));
+        let (length_max, shrunk) = (
+            self.event_radius(pass, diagonal, extinction),
+            self.event_shrinkage(pass),
+        );
         EventKernelSettings {
             spread: f64::from(self.volume_spread) * event_step(f64::from(self.photons)) * shrunk,
             dampening: f64::from(self.volume_dampening),

@@ -24,6 +24,8 @@ pub(super) struct GpuMedia {
     majorants: TexelView,
     /// The medium outside all bodies.
     pub(super) surrounding: Option<u32>,
+    /// Of any band of any medium at its densest, 1/m.
+    pub(super) greatest_extinction: f64,
 }
 
 impl GpuMedia {
@@ -37,7 +39,12 @@ impl GpuMedia {
             |name: &str, values: &[f32]| gpu.texels_with(name, Category::Material, vk::Format::R32_SFLOAT, values);
         let format = vk::Format::R32G32B32A32_UINT;
         let bytes: &[u8] = bytemuck::cast_slice(&records);
+        let greatest = |medium: &Medium| {
+            let density = medium.density.as_ref().map_or(1.0, |grid| grid.max());
+            f64::from(medium.sigma_t().max_element()) * f64::from(density)
+        };
         Ok(Self {
+            greatest_extinction: scene.media.iter().map(greatest).fold(0.0, f64::max),
             records: gpu.texels_with("media", Category::Material, format, bytes)?,
             densities: texels("densities", &densities)?,
             majorants: texels("majorants", &majorants)?,

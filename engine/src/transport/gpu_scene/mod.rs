@@ -426,6 +426,11 @@ impl GpuScene {
         )
     }
 
+    /// The greatest extinction coefficient of any band anywhere in participating media, 1/m; 0 without any.
+    pub fn greatest_extinction(&self) -> f64 {
+        self.media.as_ref().map_or(0.0, |media| media.greatest_extinction)
+    }
+
     /// Index of the medium outside all bodies, if there is one that does something.
     pub fn surrounding(&self) -> Option<u32> {
         self.media.as_ref()?.surrounding

@@ -3,7 +3,7 @@
 use clerestory::Result;
 use clerestory::scene::Phase;
 
-use super::media_albedo_one::ball;
+use super::media_albedo_one::{AT_BOUNDARIES, ball};
 use crate::scenes::SMALL;
 use crate::{Easel, HardCase, Judgement};
 
@@ -12,6 +12,10 @@ pub(super) const CASE: HardCase = HardCase {
     breaks: "(1 + g² − 2g cos θ)^(3/2) cancels to 0 in f32 where g nears ±1: directions are NaN or longer than 1.",
     expects: "A ball that only scatters, with |g| = 0.99 and optical radius 10, cannot be seen in a uniform environment of radiance 1.",
     picture: || ball(10.0, Phase::HenyeyGreenstein { g: 0.99 }),
+    documented_bias: Some(
+        "Photons of the map lack beyond the boundary of a medium: what a ray sees within a kernel's radius of it, a quarter of a mean free path, is too dark where it is not met \
+         head-on. Kernels shrink from pass to pass; choose a smaller radius.",
+    ),
     techniques: Some(judge),
     ..HardCase::BASE
 };
@@ -24,7 +28,8 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
             ("Schlick", Phase::Schlick { k: g }),
         ] {
             let painted = easel.paint_in_passes(&ball(10.0, phase)?, SMALL, 32)?;
-            judgement.mean(&format!("{what} {g}"), &painted, [1.0; 3], 0.0)?;
+            let documented = if easel.has_bias() { AT_BOUNDARIES } else { 0.0 };
+            judgement.mean_documented(&format!("{what} {g}"), &painted, [1.0; 3], [0.0, documented])?;
         }
     }
     Ok(judgement)
