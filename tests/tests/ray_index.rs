@@ -228,7 +228,7 @@ fn the_ray_engine_finds_what_indexes_find() {
         let triangles: Vec<[Vec3; 3]> = (0..300)
             .map(|_| {
                 let middle = point(2.0);
-                [0; 3].map(|_: i32| middle + point(0.3))
+                [0; 3].map(|_: i32| middle + point(0.8))
             })
             .collect();
         let mut rays: Vec<Ray> = (0..1000).map(|_| Ray::new(point(3.0), point(1.0))).collect();

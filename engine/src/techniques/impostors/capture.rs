@@ -195,6 +195,7 @@ pub(in crate::techniques) struct Capture {
     counts: CaptureCounts,
     /// What has traced its paths.
     traced_by: Vec<PipelineInfo>,
+    is_read: bool,
     is_done: bool,
 }
 
@@ -238,6 +239,7 @@ impl Capture {
             impostor: None,
             counts: CaptureCounts::default(),
             traced_by: Vec::new(),
+            is_read: false,
             is_done: false,
             plan,
         })
@@ -277,11 +279,12 @@ impl Capture {
     pub fn advance(&mut self, gpu: &Gpu, scene: &Arc<GpuScene>) -> Result<Vec<Timings>> {
         if !self.drawing.is_done() {
             let timings = self.drawing.advance(gpu, scene, &self.plan, &self.radiance)?;
-            if self.drawing.is_done() {
+            if self.drawing.is_drawn() && !self.is_read {
                 self.layers = self.read_layer(gpu)?;
-                if self.plan.by == CaptureBy::Raster {
-                    self.finish()?;
-                }
+                self.is_read = true;
+            }
+            if self.drawing.is_done() && self.plan.by == CaptureBy::Raster {
+                self.finish()?;
             }
             return Ok(timings);
         }

@@ -22,6 +22,7 @@ pub(super) struct MapDrawing {
     shading: Option<Shading>,
     coverage: Coverage,
     pieces: VecDeque<Piece>,
+    is_drawn: bool,
 }
 
 /// What shades a map.
@@ -97,6 +98,7 @@ impl MapDrawing {
             shading,
             coverage: Coverage::new(gpu)?,
             pieces,
+            is_drawn: false,
         })
     }
 
@@ -113,6 +115,11 @@ impl MapDrawing {
     /// What was drawn.
     pub fn gbuffer(&self) -> &GBuffer {
         &self.gbuffer
+    }
+
+    /// Whether all surfaces are drawn: what is read of them is read before they are shaded.
+    pub fn is_drawn(&self) -> bool {
+        self.is_drawn
     }
 
     /// Whether nothing is left to do.
@@ -146,6 +153,7 @@ impl MapDrawing {
                 return Ok(Vec::new());
             }
             (Piece::Surfaces(part), _) => {
+                self.is_drawn = part.ends;
                 self.gbuffer.record_part(&mut recorder, &surfaces, &octants()?, &part)?;
             }
             (Piece::Lights, Some(Shading { lights, .. })) => {
