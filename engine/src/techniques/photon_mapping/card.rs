@@ -275,11 +275,11 @@ mod tests {
                 assert!(known, "{name} is not a constant of {}", shader.name);
             }
         }
-        // What photons need of surfaces, eye paths need too, and say.
+        // What photons need of the scene, eye paths need too, and say; classes of paths are the settings'.
         for constant in photon_scatter::INFO
             .spec_constants
             .iter()
-            .filter(|c| c.name.starts_with("has_"))
+            .filter(|c| c.name.starts_with("has_") && c.name != "has_classes")
         {
             let said = SURFACE_FEATURES.iter().chain(&PHOTON_FEATURES);
             assert!(
