@@ -121,8 +121,9 @@ impl Layers {
     fn begin(&mut self, gpu: &Gpu, scene: &GpuScene) -> Result<Tracing> {
         let surfaces = scene.surfaces();
         let triangles = surfaces.set.scene_triangles.buffer().view();
+        let index = scene.index_on_device();
         let tracing = Tracing {
-            tracer: RayTracer::on_device(gpu, scene.index_on_device(), &TraceSettings::ray_per_thread())?,
+            tracer: RayTracer::on_device(gpu, index, &TraceSettings::ray_per_thread().fitted(gpu.caps(), index.traversal))?,
             triangles: gpu.read(triangles, surfaces.triangles as usize)?,
             objects: surfaces.objects.to_vec(),
         };
