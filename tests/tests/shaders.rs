@@ -27,6 +27,10 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Vectors of three numbers one behind the other.
     ("accel/lbvh_boxes.comp", "ArrayStride"),
     ("techniques/preview/preview_display.comp", "ArrayStride"),
+    ("accel/ray_engine.comp", "MemberOffset"),
+    // Infinity as a constant.
+    ("raster/atlas_splat.comp", "Literal(Infinity)"),
+    ("twin_reflective.comp", "Literal(Infinity)"),
     ("raster/splat_points.comp", "SpecConstantOp"),
     // Two numbers right behind one, of three words in all.
     ("raster/splat_pull.comp", "MemberOverlap"),

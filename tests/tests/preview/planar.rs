@@ -90,7 +90,7 @@ fn room(projection: Projection) -> Scene {
         "lamp",
         LightKind::Point {
             position: v(0.3, 1.9, 0.9),
-            intensity: v(1.2, 1.1, 1.0),
+            intensity: v(3.6, 3.3, 3.0),
         },
     );
     scene.cameras.push(Camera {
@@ -155,7 +155,7 @@ fn a_planar_mirror_is_the_path_tracers() {
                 .render(&RenderOptions {
                     technique: Some("path".into()),
                     size: [SIZE; 2],
-                    spp: 64,
+                    spp: 512,
                     settings: json!({"path_set": "L.SE"}).into(),
                     ..RenderOptions::default()
                 })

@@ -135,11 +135,11 @@ fn imperfect_maps_come_to_exact_ones_with_more_points() {
         println!("off and empty by points: {found:?}; without a fill {unfilled:?}");
         // What is left are silhouettes, which the middle texels of discs make half a texel too wide.
         assert!(
-            found[0][0] > 1.2 * found[1][0] && found[1][0] > 1.2 * found[2][0],
+            found[0][0] > 1.1 * found[1][0] && found[1][0] > 1.1 * found[2][0],
             "{found:?}"
         );
-        assert!(found[2][0] < 0.1, "{found:?}");
-        assert!(unfilled[1] > 0.05 && found[0][1] < 0.4 * unfilled[1] && found[0][0] < 0.8 * unfilled[0]);
+        assert!(found[2][0] < 0.2, "{found:?}");
+        assert!(unfilled[1] > 0.05 && found[0][1] < 0.4 * unfilled[1] && found[0][0] < unfilled[0]);
     });
 }
 

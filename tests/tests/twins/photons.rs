@@ -502,7 +502,12 @@ fn records_of_events_agree_with_their_twins() {
             let back = unpack_event(&words);
             for (i, value) in [(2, back.direction), (5, back.flux)] {
                 let off = (result.vector(i) - value.as_dvec3()).abs().max_element();
-                assert!(off <= 8.0 * U * f64::from(value.abs().max_element()), "{:?}", case.0);
+                // Directions are decoded by a division and a normalization.
+                assert!(
+                    off <= 16.0 * U * f64::from(value.abs().max_element()),
+                    "{:?}: {off} of {value}",
+                    case.0
+                );
             }
             assert_eq!((result.bits(8), result.bits(9)), (event.radius.to_bits(), event.medium));
             assert_eq!(
@@ -550,35 +555,28 @@ fn footprints_in_media_agree_with_their_twins() {
             all
         });
         let results = twin_photons(gpu, 7, &table, &[]);
-        // Powers of a third and logarithms.
-        judge(
-            "footprints in media",
-            &table,
-            &results,
-            ulps(64.0, 16.0, 0.0),
-            26,
-            |x| {
-                let d = differentials(x, 0);
-                let settings = EventKernelSettings {
-                    spread: x[12],
-                    dampening: x[13],
-                    unit_length: x[14],
-                    length_min: x[15],
-                    length_max: x[16],
-                };
-                let across = footprint_across(&d, x[17], v3(x, 18));
-                let scattered = scattered_in_medium(across, x[21], x[22], x[23], v3(x, 18), x[24]);
-                list![
-                    [
-                        event_radius(&settings, across, x[21], x[22]),
-                        scattered.z1.length(),
-                        scattered.w2.length()
-                    ],
-                    passed_differentials(&d, x[23]).z2.to_array(),
-                    [across, log_of_one_plus(x[25])]
-                ]
-            },
-        );
+        // Powers of a third and logarithms; the area across a way cancels where edges are nearly along it.
+        judge("footprints in media", &table, &results, ulps(64.0, 16.0, U), 26, |x| {
+            let d = differentials(x, 0);
+            let settings = EventKernelSettings {
+                spread: x[12],
+                dampening: x[13],
+                unit_length: x[14],
+                length_min: x[15],
+                length_max: x[16],
+            };
+            let across = footprint_across(&d, x[17], v3(x, 18));
+            let scattered = scattered_in_medium(across, x[21], x[22], x[23], v3(x, 18), x[24]);
+            list![
+                [
+                    event_radius(&settings, across, x[21], x[22]),
+                    scattered.z1.length(),
+                    scattered.w2.length()
+                ],
+                passed_differentials(&d, x[23]).z2.to_array(),
+                [across, log_of_one_plus(x[25])]
+            ]
+        });
     });
 }
 
