@@ -122,7 +122,8 @@ fn colours_without_a_spectrum_are_refused() {
     };
     let scene = trough(&spectrum, 0.0);
     let tinted = Vec3::new(1.0, 0.9, 1.0);
-    let cases: [(&str, &dyn Fn(&mut Scene), &[SpectralMetal]); 9] = [
+    type Change<'a> = &'a dyn Fn(&mut Scene);
+    let cases: [(&str, Change<'_>, &[SpectralMetal]); 9] = [
         ("materials[1]: is not there", &|_| (), &[metal(1)]),
         ("has two spectra", &|_| (), &[metal(0), metal(0)]),
         ("(metal): the conductor, which has no spectrum", &|_| (), &[]),

@@ -314,7 +314,7 @@ impl<'a> Trial<'a> {
         mut pilot: Rendering,
         [mut before, mut last]: [Run; 2],
     ) -> Result<()> {
-        for [spp, next] in ROUNDS.array_windows() {
+        for (spp, next) in ROUNDS.iter().zip(&ROUNDS[1..]) {
             let samples = next - spp;
             let goes_on = last.seconds < SHORT_SECONDS
                 || longer_run(before, last, samples).is_some_and(|expected| expected <= COST_SECONDS);

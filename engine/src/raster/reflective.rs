@@ -333,7 +333,7 @@ mod tests {
             chi_square < degrees + 4.0 * f64::sqrt(2.0 * degrees),
             "{chi_square} {degrees}"
         );
-        assert!(warp_through(&flux_levels(&vec![0.0; 16], 4), DVec2::splat(0.5)).is_none());
+        assert!(warp_through(&flux_levels(&[0.0; 16], 4), DVec2::splat(0.5)).is_none());
     }
 
     /// The published weight is right for what is the same everywhere, and off by an eighth and a quarter for what grows and falls along the radius.

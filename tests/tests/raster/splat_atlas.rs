@@ -11,6 +11,11 @@ use glam::Vec3;
 
 use crate::directions::{octahedron_rays, place_in, prepare};
 
+/// Whether two distances, both of which may be infinite, differ by less than a share.
+fn near(found: f64, expected: f64, share: f64) -> bool {
+    found == expected || (found / expected - 1.0).abs() < share
+}
+
 /// In the room, off all surfaces.
 const SHARES: [Vec3; 3] = [
     Vec3::new(0.55, 0.6, 0.35),
@@ -69,7 +74,7 @@ fn imperfect_maps_are_those_of_the_twin() {
                 let holes = twin.iter().copied().fold(0, empty);
                 let differs = |(found, expected): &(&f32, &f64)| {
                     let found = f64::from(**found);
-                    found != **expected && !((found / **expected - 1.0).abs() < 1e-4)
+                    !near(found, **expected, 1e-4)
                 };
                 let wrong = map.iter().zip(&twin).filter(differs).count();
                 println!(
@@ -126,7 +131,7 @@ fn imperfect_maps_come_to_exact_ones_with_more_points() {
                 let counted = map.iter().zip(&exact).filter(|(found, exact)| counts(**found, **exact));
                 counted.count() as f64 / exact.len() as f64
             };
-            let off = share(&|found, exact| found != exact && !((found / exact - 1.0).abs() < 0.1));
+            let off = share(&|found, exact| !near(found.into(), exact.into(), 0.1));
             let empty = share(&|found, exact| found == f32::INFINITY && exact < f32::INFINITY);
             [off, empty]
         };

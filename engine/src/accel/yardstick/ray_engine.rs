@@ -1,7 +1,7 @@
 //! Closest hits without an index: a pass over all rays for each triangle.
 //!
 //! Source: N. Carr, J. Hall, J. Hart, "The Ray Engine", Graphics Hardware 2002, where rays lie in textures, a triangle is drawn over all of them, and the depth test keeps the nearest. Here a dispatch stands for the
-//! draw, and the hit so far for the depth. Work is rays times triangles. The test is the watertight one of [`intersect_triangle`](crate::accel::triangle::intersect_triangle), of equally near triangles the first is kept.
+//! draw, and the hit so far for the depth. Work is rays times triangles. The test is the watertight one of [`intersect_triangle`], of equally near triangles the first is kept.
 //! Deterministic; hits have the bits of the host's, [`RayEngine::on_host`], where divisions are exact.
 
 use glam::Vec3;

@@ -123,7 +123,11 @@ impl Layers {
         let triangles = surfaces.set.scene_triangles.buffer().view();
         let index = scene.index_on_device();
         let tracing = Tracing {
-            tracer: RayTracer::on_device(gpu, index, &TraceSettings::ray_per_thread().fitted(gpu.caps(), index.traversal))?,
+            tracer: RayTracer::on_device(
+                gpu,
+                index,
+                &TraceSettings::ray_per_thread().fitted(gpu.caps(), index.traversal),
+            )?,
             triangles: gpu.read(triangles, surfaces.triangles as usize)?,
             objects: surfaces.objects.to_vec(),
         };

@@ -111,7 +111,7 @@ mod tests {
             for depth in [1e-4, 1.0, 8.0] {
                 let r = depth / sigma;
                 let across = footprint_across(&emission_differentials(DVec3::Z, uniform), r, DVec3::Z);
-                let pdf = sigma * (-depth as f64).exp();
+                let pdf = sigma * (-depth).exp();
                 let settings = EventKernelSettings {
                     spread: 3.0 * event_step(n),
                     ..SETTINGS
