@@ -727,7 +727,7 @@ fn lists_are_readable_by_people_and_programs() -> Tested {
     for said in [
         "  code         engine/src/techniques/photon_mapping/\n",
         "  kernels      shaders/techniques/photon_mapping/\n",
-        "  tests        tests/tests/photon/",
+        "tests/tests/photon/convergence.rs\n",
         "  measured by  clerestory report photon-convergence",
         "  results      results/photon-",
         "  settings     `path_set`, `photons`",
