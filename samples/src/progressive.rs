@@ -4,12 +4,13 @@ use std::time::{Duration, Instant};
 
 use clerestory::Result;
 use clerestory::film::PixelFormat;
-use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
+use clerestory::gpu::{Buffer, Gpu};
 use clerestory::render::{RenderOptions, Renderer, Rendering};
 use clerestory::settings::Settings;
 use clerestory::techniques::{self, Card};
 
 use crate::orbit::{Orbit, Pose};
+use crate::window;
 
 /// Time of work for one frame.
 const FRAME: Duration = Duration::from_millis(50);
@@ -137,12 +138,9 @@ impl Progressive {
             ..self.options.clone()
         })?;
         rendering.set_camera(&orbit.camera())?;
-        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
         Ok(State {
             rendering,
-            pixels: self
-                .gpu
-                .buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
+            pixels: window::pixels(&self.gpu, size)?,
             size,
             pose: orbit.pose(),
             samples: 0.0,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clerestory::film::PixelFormat;
-use clerestory::gpu::{Buffer, Gpu, GpuOptions, Presented, Surface};
+use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu, GpuOptions, Presented, Surface};
 use clerestory::scene::{self, Scene, SceneProfile};
 use clerestory::{Error, Result};
 use winit::application::ApplicationHandler;
@@ -60,6 +60,15 @@ pub struct Shown {
     pub pixels: Buffer,
     /// Seconds of rendering.
     pub seconds: f64,
+}
+
+/// Memory for a frame of so many pixels, four bytes each.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn pixels(gpu: &Gpu, size: [u32; 2]) -> Result<Buffer> {
+    let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+    gpu.buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))
 }
 
 /// What a frame is made for.

@@ -2,6 +2,21 @@
 
 use std::process::Command;
 
+/// 64-bit FNV-1a of words, byte by byte.
+pub fn hash_of(words: impl IntoIterator<Item = u32>) -> u64 {
+    words
+        .into_iter()
+        .flat_map(u32::to_le_bytes)
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+}
+
+/// Prints the hash of words as [`hash_in_child`] reads it.
+pub fn print_hash(words: impl IntoIterator<Item = u32>) {
+    println!("hash {:016x}", hash_of(words));
+}
+
 /// What the test `test` of this program prints behind `hash ` when it runs alone with the variable `asked` set, and these besides; panics
 /// where it fails or prints none.
 pub fn hash_in_child(test: &str, asked: &str, variables: &[(&str, &str)]) -> String {

@@ -9,7 +9,9 @@ use clerestory::techniques::path::PathCounters;
 use clerestory::techniques::{PathTracer, PathTracerSettings, Technique};
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathSet};
-pub use clerestory_hard_cases::scenes::{camera_down, cuboid, floor, floor_from_above, lamp, point_triangle};
+pub use clerestory_hard_cases::scenes::{
+    camera_down, cuboid, floor, floor_from_above, lamp, medium, point_triangle, quad,
+};
 
 use glam::{DVec3, Vec3};
 
@@ -71,12 +73,7 @@ impl Rendered {
 
     /// 64-bit FNV-1a of [`Rendered::bits`].
     pub fn hash(&self) -> u64 {
-        self.bits()
-            .iter()
-            .flat_map(|word| word.to_le_bytes())
-            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-                (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-            })
+        crate::child::hash_of(self.bits())
     }
 
     /// Mean over the picture and the variance of that mean, per channel.

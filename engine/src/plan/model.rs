@@ -403,27 +403,20 @@ pub struct PairCost {
     pub start: f64,
     /// Of one pilot, for each further sample.
     pub sample: f64,
-    /// Samples per pixel of the pair that has told it.
+    /// Samples per pixel of the pilots that have told it.
     by: u32,
 }
 
 impl PairCost {
-    /// A pair of `spp` samples per pixel took so many seconds beyond the first samples. True where it is the one of the most samples, which knows best.
-    pub fn measure(&mut self, spp: u32, seconds: f64) -> bool {
+    /// Pilots of `spp` samples per pixel took so many seconds for `samples` of their samples, all pilots together. True where they are those of the most samples, which
+    /// know best.
+    pub fn measure(&mut self, spp: u32, samples: u32, seconds: f64) -> bool {
         let knows_best = spp > self.by;
         if knows_best {
-            self.sample = seconds / f64::from(2 * (spp - 1).max(1));
-            self.by = spp;
-        }
-        knows_best
-    }
-
-    /// A pilot of `spp` samples per pixel took so many seconds for its last `samples`.
-    pub fn measure_run(&mut self, spp: u32, samples: u32, seconds: f64) {
-        if spp > self.by {
             self.sample = seconds / f64::from(samples.max(1));
             self.by = spp;
         }
+        knows_best
     }
 
     /// Seconds that a pair of so many samples per pixel takes.
@@ -485,13 +478,13 @@ mod tests {
         assert_eq!(longer_run(run(25.0, 1), faster, 12), Some(20.0));
         assert_eq!(longer_run(run(25.0, 3), run(25.0, 3), 12), None);
         let mut cost = PairCost::default();
-        assert!(cost.measure(4, 6.0 * 10.0));
-        cost.measure_run(16, 12, 24.0);
+        assert!(cost.measure(4, 6, 6.0 * 10.0));
+        cost.measure(16, 12, 24.0);
         assert_eq!(cost.sample, 2.0);
         // Shorter ones know less.
-        cost.measure_run(16, 12, 36.0);
-        assert!(!cost.measure(8, 700.0) && cost.sample == 2.0);
-        assert!(cost.measure(17, 96.0) && cost.sample == 3.0);
+        cost.measure(16, 12, 36.0);
+        assert!(!cost.measure(8, 14, 700.0) && cost.sample == 2.0);
+        assert!(cost.measure(17, 32, 96.0) && cost.sample == 3.0);
     }
 
     // A last pair of more samples than rounds had makes no sample dearer.
@@ -502,8 +495,8 @@ mod tests {
             ..PairCost::default()
         };
         let seconds = |spp: u32| 2.0 * 0.125 * f64::from(spp - 1);
-        assert!(cost.measure(4, seconds(4)) && cost.measure(16, seconds(16)));
-        assert!(!cost.measure(8, 100.0));
+        assert!(cost.measure(4, 6, seconds(4)) && cost.measure(16, 30, seconds(16)));
+        assert!(!cost.measure(8, 14, 100.0));
         assert_eq!([1, 4, 64].map(|spp| cost.samples(cost.seconds(spp))), [1, 4, 64]);
         assert_eq!(cost.seconds(64), 1.0 + seconds(64));
         assert_eq!([cost.samples(0.9), cost.samples(f64::INFINITY)], [0, u32::MAX]);

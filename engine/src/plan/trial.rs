@@ -290,7 +290,7 @@ impl<'a> Trial<'a> {
             return Ok(None);
         };
         let pictures = [one, other];
-        let knows_best = self.pairs.measure(spp, seconds);
+        let knows_best = self.pairs.measure(spp, 2 * (spp - 1).max(1), seconds);
         if spp == ROUNDS[0] {
             self.first_round = 0.5 * seconds;
             let of_one = |samples: u32, seconds: f64| Run {
@@ -328,7 +328,7 @@ impl<'a> Trial<'a> {
             }
             let seconds = begun.elapsed().as_secs_f64();
             (before, last) = (last, Run { samples, seconds });
-            self.pairs.measure_run(*next, samples, seconds);
+            self.pairs.measure(*next, samples, seconds);
         }
         Ok(())
     }

@@ -25,10 +25,7 @@ use super::splats::places_on;
 use super::{OmniShadowImage, ShadowLayout, Surfaces, shadow_texel_radius};
 use crate::accel::MAX_COORDINATE;
 use crate::catalogue::{Bias, Role, Row, sources};
-use crate::gpu::shaders::constants::{
-    ATLAS_EMPTY, ATLAS_PCG_INCREMENT, ATLAS_PCG_MULTIPLIER, ATLAS_PCG_PERMUTATION, ATLAS_REACH, ATLAS_SAME_SURFACE,
-    PACKED_NORMAL_BITS,
-};
+use crate::gpu::shaders::constants::{ATLAS_EMPTY, ATLAS_REACH, ATLAS_SAME_SURFACE, PACKED_NORMAL_BITS};
 use crate::gpu::shaders::raster::{atlas_pull, atlas_push, atlas_splat, atlas_surfels};
 use crate::gpu::shaders::sets::OmniShadowSet;
 use crate::gpu::shaders::types::{AtlasLevel, OrientedSurfel, SceneTriangle, SurfelPlace};
@@ -40,6 +37,7 @@ use crate::maps::octahedron::octahedron_encode;
 use crate::maps::packed_direction::unpack_octahedral;
 use crate::maps::topology::octahedron_wrap;
 use crate::maps::{Parametrization, Texel};
+pub use crate::scene::builtin::noise::hash as atlas_hash;
 use crate::{Error, Result};
 
 /// Points that a map's each is one of: so many maps have no point in common, about.
@@ -345,15 +343,6 @@ fn surfel_places(triangles: &[[Vec3; 3]], count: u32) -> (Vec<SurfelPlace>, f64)
         weights: uv.as_vec2().max(Vec2::ZERO).to_array(),
     };
     (places.map(place).collect(), area)
-}
-
-/// A word by the hash of M. O'Neill's PCG generators with 32 bits.
-pub fn atlas_hash(word: u32) -> u32 {
-    let state = word
-        .wrapping_mul(ATLAS_PCG_MULTIPLIER)
-        .wrapping_add(ATLAS_PCG_INCREMENT);
-    let mixed = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(ATLAS_PCG_PERMUTATION);
-    (mixed >> 22) ^ mixed
 }
 
 /// Which surfel of its stratum is the so many-th point of a map.

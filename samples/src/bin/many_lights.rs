@@ -14,14 +14,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
+use clerestory::Result;
 use clerestory::film::PixelFormat;
-use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
+use clerestory::gpu::{Buffer, Gpu};
 use clerestory::settings::TypedSettings;
-use clerestory::techniques;
 use clerestory::techniques::instant_radiosity::Bound;
 use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Visibility};
 use clerestory::transport::{GpuScene, PathSet};
-use clerestory::{Error, Result};
 use clerestory_samples::arguments::Arguments;
 use clerestory_samples::carousel::Carousel;
 use clerestory_samples::orbit::{Orbit, Pose};
@@ -106,14 +105,6 @@ impl ManyLights {
     fn new(canvas: &Canvas<'_>, settings: ManyLightSettings, turn: f64) -> Result<Self> {
         let lamp = Carousel::new(canvas.scene)?;
         let scene = GpuScene::new(canvas.gpu, canvas.scene)?;
-        let technique = techniques::by_id("many-light")?;
-        let reasons = (technique.refusals)(scene.profile());
-        if !reasons.is_empty() {
-            return Err(Error::Unsupported {
-                technique: technique.id.into(),
-                reasons,
-            });
-        }
         scene.move_light(canvas.gpu, lamp.light(), &lamp.at(0.0))?;
         Ok(Self {
             gpu: canvas.gpu.clone(),
@@ -133,7 +124,6 @@ impl ManyLights {
 
     /// A picture of another size, or with other settings.
     fn open(&self, orbit: &Orbit, size: [u32; 2]) -> Result<View> {
-        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
         Ok(View {
             renderer: ManyLight::new(
                 &self.gpu,
@@ -142,9 +132,7 @@ impl ManyLights {
                 size,
                 self.settings.clone(),
             )?,
-            pixels: self
-                .gpu
-                .buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
+            pixels: window::pixels(&self.gpu, size)?,
             size,
             pose: orbit.pose(),
             samples: 0,

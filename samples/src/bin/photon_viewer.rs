@@ -16,13 +16,12 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
+use clerestory::Result;
 use clerestory::film::PixelFormat;
-use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu};
+use clerestory::gpu::{Buffer, Gpu};
 use clerestory::settings::TypedSettings;
-use clerestory::techniques;
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 use clerestory::transport::GpuScene;
-use clerestory::{Error, Result};
 use clerestory_samples::arguments::Arguments;
 use clerestory_samples::carousel::Carousel;
 use clerestory_samples::orbit::{Orbit, Pose};
@@ -106,14 +105,6 @@ impl PhotonViewer {
     fn new(canvas: &Canvas<'_>, settings: PhotonSettings, turn: f64, flight: f64) -> Result<Self> {
         let light = Carousel::new(canvas.scene)?;
         let scene = GpuScene::new(canvas.gpu, canvas.scene)?;
-        let technique = techniques::by_id("photon")?;
-        let reasons = (technique.refusals)(scene.profile());
-        if !reasons.is_empty() {
-            return Err(Error::Unsupported {
-                technique: technique.id.into(),
-                reasons,
-            });
-        }
         scene.move_light(canvas.gpu, light.light(), &light.at(0.0))?;
         Ok(Self {
             gpu: canvas.gpu.clone(),
@@ -134,7 +125,6 @@ impl PhotonViewer {
 
     /// A picture of another size.
     fn open(&self, orbit: &Orbit, size: [u32; 2]) -> Result<View> {
-        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
         Ok(View {
             mapper: PhotonMapper::new(
                 &self.gpu,
@@ -143,9 +133,7 @@ impl PhotonViewer {
                 size,
                 self.settings.clone(),
             )?,
-            pixels: self
-                .gpu
-                .buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
+            pixels: window::pixels(&self.gpu, size)?,
             size,
             pose: orbit.pose(),
             samples: 0,

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clerestory::film::PixelFormat;
-use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu, GpuOptions, Recorder};
+use clerestory::gpu::{Buffer, Gpu, GpuOptions, Recorder};
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{self, LightKind, Material, Mesh, Scene, SceneProfile, metals};
 use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows};
@@ -331,12 +331,11 @@ impl Stage {
             walls[bounce % 2].record(&mut recorder, scene, &bare, &preview, middle, by)?;
         }
         recorder.submit()?.wait()?;
-        let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
         Ok(View {
             preview,
             walls,
             around,
-            pixels: gpu.buffer(&BufferDesc::storage("shown pixels", bytes, Category::Film))?,
+            pixels: window::pixels(gpu, size)?,
             size,
         })
     }

@@ -32,6 +32,7 @@ layout(push_constant, scalar) uniform Push {
     uint first_deposit;  // least
     float flux_scale;    // of fluxes as they are stored
     float piece;         // about how long pieces of ways are, m
+    uint pieces_most;    // of a way
     uint classes[2];     // successors of each class of photons by scattering in a medium
     EventKernelSettings kernel;  // without footprints all have the greatest radius
 } push;
@@ -45,8 +46,6 @@ layout(push_constant, scalar) uniform Push {
 
 // Optical depth beyond which what is left of a way is not stored: a ten millionth of its light.
 const float WAY_DEPTH = 16.0;
-// Pieces of a way, at most.
-const uint WAY_PIECES = 32u;
 // Of PATH_SET_STATE_BITS each.
 const uint CLASSES_PER_WORD = 8u;
 
@@ -63,7 +62,7 @@ uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedi
     uint bounce = path_set_bounce(photon.bounce);
     vec3 extinction = mix(m.sigma_t, vec3(FAR_AWAY), equal(m.sigma_t, vec3(0.0)));
     reach = min(reach, WAY_DEPTH / min(extinction.x, min(extinction.y, extinction.z)));
-    uint pieces = uint(clamp(ceil(reach / push.piece), 1.0, float(WAY_PIECES)));
+    uint pieces = uint(clamp(ceil(reach / push.piece), 1.0, float(push.pieces_most)));
     atomicAdd(photon_medium_counters.events, pieces);
     PhotonWay way;
     way.start = photon.origin + start * photon.direction;

@@ -1,7 +1,9 @@
 //! Scenes whose picture is known, and the parts that they are made of.
 
 use clerestory::Result;
-use clerestory::scene::{Camera, DensityGrid, Environment, LightKind, Material, Medium, Mesh, Projection, Scene, load};
+use clerestory::scene::{
+    Camera, DensityGrid, Environment, LightKind, Material, Medium, Mesh, Phase, Projection, Scene, load,
+};
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::random::Random;
@@ -50,6 +52,28 @@ pub fn floor(name: &str, material: u32, half: f32, y: f32) -> Mesh {
             corner(1.0, -1.0),
             corner(-1.0, -1.0),
         ],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        material: Some(material),
+        ..Mesh::default()
+    }
+}
+
+/// A medium of extinction σ and albedo c.
+pub fn medium(sigma_t: f32, albedo: f32, phase: Phase) -> Medium {
+    Medium {
+        name: "medium".into(),
+        sigma_a: Vec3::splat(sigma_t * (1.0 - albedo)),
+        sigma_s: Vec3::splat(sigma_t * albedo),
+        phase,
+        ..Medium::default()
+    }
+}
+
+/// Two triangles between corners that follow each other.
+pub fn quad(name: &str, material: u32, corners: [Vec3; 4]) -> Mesh {
+    Mesh {
+        name: name.into(),
+        positions: corners.into(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         material: Some(material),
         ..Mesh::default()

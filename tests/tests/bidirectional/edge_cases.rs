@@ -5,7 +5,7 @@ use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::techniques::PathTracerSettings;
 use clerestory::techniques::bidirectional::BidirectionalCounts;
-use clerestory_tests::child::hash_in_child;
+use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::gpu;
 use clerestory_tests::render::{camera_down, floor};
 
@@ -144,13 +144,7 @@ fn prints_its_hash_when_asked() {
     }
     let gpu = gpu();
     let mut renderer = renderer(&gpu, &lit_room(), SIZE, &settings());
-    let hash = bits(&advance(&mut renderer, 4))
-        .iter()
-        .flat_map(|word| word.to_le_bytes())
-        .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-    println!("hash {hash:016x}");
+    print_hash(bits(&advance(&mut renderer, 4)));
     clerestory_tests::assert_no_messages(&gpu);
 }
 

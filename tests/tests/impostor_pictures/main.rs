@@ -9,6 +9,7 @@ mod reflections;
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Rendered, Renderer};
 use clerestory::scene::{Camera, LightKind, Material, Mesh, Scene};
+use clerestory_tests::render::quad;
 use clerestory_tests::with_gpu;
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
@@ -22,17 +23,6 @@ const COLORS: [[f32; 3]; 6] = [
     [0.3, 0.8, 0.4],
     [0.7, 0.3, 0.8],
 ];
-
-/// Two triangles between corners that follow each other.
-fn quad(name: &str, material: u32, corners: [Vec3; 4]) -> Mesh {
-    Mesh {
-        name: name.into(),
-        positions: corners.to_vec(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(material),
-        ..Mesh::default()
-    }
-}
 
 /// A sphere with normals.
 fn sphere(material: u32, centre: Vec3, radius: f32, slices: u32) -> Mesh {

@@ -12,7 +12,7 @@ use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{AlphaMode, Camera, Environment};
 use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Placement, Visibility};
 use clerestory_hard_cases::scenes::orthographic;
-use clerestory_tests::child::hash_in_child;
+use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::{camera_down, floor};
 use glam::DVec3;
 
@@ -472,10 +472,6 @@ fn prints_its_hash_when_asked() {
             ..exact()
         };
         all.extend(bits(&picture(gpu, &furnished(), [13, 7], &settings, 1)));
-        // FNV-1a over words.
-        let hash = all.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, word| {
-            (hash ^ u64::from(*word)).wrapping_mul(0x0100_0000_01b3)
-        });
-        println!("hash {hash:016x}");
+        print_hash(all);
     });
 }

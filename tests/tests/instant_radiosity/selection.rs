@@ -6,7 +6,7 @@ use clerestory::gpu::shaders::constants::LIGHT_NODE_LEAF;
 use clerestory::gpu::shaders::types::SceneLightNode;
 use clerestory::techniques::instant_radiosity::Selection;
 use clerestory::transport::light_tree::light_node_union;
-use clerestory_tests::child::hash_in_child;
+use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::gpu;
 
 /// Set in the processes that only print their picture's hash.
@@ -201,15 +201,9 @@ fn prints_its_hash_when_asked() {
     let gpu = gpu();
     let settings = VirtualLightSettings { walks: 64, ..cuts(8) };
     let (radiance, counts) = picture(&gpu, &room(), &settings, 2);
-    let words = bits(&radiance)
-        .into_iter()
-        .map(u64::from)
-        .chain([counts.gather.nodes, counts.gather.shadow_rays]);
-    // FNV-1a over the words.
-    let hash = words.fold(0xcbf2_9ce4_8422_2325u64, |hash, word| {
-        (hash ^ word).wrapping_mul(0x100_0000_01b3)
-    });
-    println!("hash {hash:016x}");
+    let counted = [counts.gather.nodes, counts.gather.shadow_rays];
+    let halves = counted.iter().flat_map(|count| [*count as u32, (*count >> 32) as u32]);
+    print_hash(bits(&radiance).into_iter().chain(halves));
     clerestory_tests::assert_no_messages(&gpu);
 }
 

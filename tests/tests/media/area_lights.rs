@@ -3,7 +3,7 @@
 //! Values: single scattering by quadrature in f64, of a square lamp beside one ray through a box whose density is linear in the height, where
 //! optical depths are closed forms; elsewhere pictures with and without those samples, whose expectations are the same.
 
-use clerestory::scene::{AlphaMode, Environment, Mesh};
+use clerestory::scene::{AlphaMode, Environment};
 use clerestory::transport::phase::phase_function;
 use clerestory_tests::render::{builtin, independent, paths, tracer};
 use clerestory_tests::with_gpu;
@@ -38,18 +38,16 @@ fn add_lamp(scene: &mut Scene, is_point: bool) {
     lamp.double_sided = false;
     let lamp = scene.add_material(lamp);
     let corner = |i: f64, k: f64| DVec3::new(x + HALF * i, y, HALF * k).as_vec3();
-    scene.place(Mesh {
-        name: "lamp".into(),
-        positions: vec![
+    scene.place(quad(
+        "lamp",
+        lamp,
+        [
             corner(-1.0, -1.0),
             corner(1.0, -1.0),
             corner(1.0, 1.0),
             corner(-1.0, 1.0),
         ],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(lamp),
-        ..Mesh::default()
-    });
+    ));
 }
 
 fn lamp_by_ray(in_grid: bool, is_point: bool, phase: Phase) -> Scene {

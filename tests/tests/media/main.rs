@@ -18,24 +18,13 @@ use std::f64::consts::PI;
 use clerestory::gpu::Gpu;
 use clerestory::scene::{Camera, DensityGrid, LightKind, Material, Medium, Phase, Projection, Scene};
 use clerestory::techniques::PathTracerSettings;
-use clerestory_tests::render::{Rendered, cuboid, render};
+use clerestory_tests::render::{Rendered, cuboid, medium, quad, render};
 use clerestory_tests::statistics::expect_mean;
 use glam::{DVec3, Vec3};
 
 /// A relative difference far below all noise, with which `expect_uniform` looks at the mean over the picture alone: single pixels of few
 /// samples are not normal where rare samples count much, as at the ends of long walks.
 const MEAN_ONLY: f64 = 1e-6;
-
-/// A medium of extinction σ and albedo c.
-fn medium(sigma_t: f32, albedo: f32, phase: Phase) -> Medium {
-    Medium {
-        name: "medium".into(),
-        sigma_a: Vec3::splat(sigma_t * (1.0 - albedo)),
-        sigma_s: Vec3::splat(sigma_t * albedo),
-        phase,
-        ..Medium::default()
-    }
-}
 
 /// Adds a box of a medium behind an invisible boundary.
 fn add_box(scene: &mut Scene, medium: Medium, low: Vec3, high: Vec3) {

@@ -1,7 +1,7 @@
 //! The same bits on every run and any number of threads, and however much had to be done twice.
 
 use super::*;
-use clerestory_tests::child::hash_in_child;
+use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::builtin;
 use clerestory_tests::{gpu, with_gpu};
 
@@ -68,13 +68,7 @@ fn prints_its_hash_when_asked() {
         return;
     }
     let gpu = gpu();
-    let hash = bits(&picture(&gpu))
-        .iter()
-        .flat_map(|word| word.to_le_bytes())
-        .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-    println!("hash {hash:016x}");
+    print_hash(bits(&picture(&gpu)));
     clerestory_tests::assert_no_messages(&gpu);
 }
 

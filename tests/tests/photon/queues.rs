@@ -4,7 +4,7 @@ use super::settings::room;
 use super::*;
 use clerestory::gpu::{GpuOptions, Lesser, OptionalFeatures};
 use clerestory::techniques::photon_mapping::{GatherCounts, MapQueue};
-use clerestory_tests::child::hash_in_child;
+use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::builtin;
 use clerestory_tests::{gpu, gpu_with, with_gpu};
 
@@ -270,16 +270,10 @@ fn prints_its_hash_when_asked() {
     };
     // Slots are no queue: nothing of theirs comes in the order of threads.
     let queues = FORMS.iter().filter(|(queue, _)| *queue != MapQueue::Slots);
-    let hash = queues
-        .flat_map(|form| {
-            let mut words = made(&gpu, &seen_little(), &direct(), *form).bits;
-            words.extend(made(&gpu, &seen_little(), &stopping, *form).bits);
-            words
-        })
-        .flat_map(u32::to_le_bytes)
-        .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-    println!("hash {hash:016x}");
+    print_hash(queues.flat_map(|form| {
+        let mut words = made(&gpu, &seen_little(), &direct(), *form).bits;
+        words.extend(made(&gpu, &seen_little(), &stopping, *form).bits);
+        words
+    }));
     clerestory_tests::assert_no_messages(&gpu);
 }

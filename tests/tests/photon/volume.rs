@@ -3,11 +3,11 @@
 use super::*;
 use clerestory::Error;
 use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase, Projection};
-use clerestory::techniques::photon_mapping::volume::event::PhotonEvent;
+use clerestory::techniques::photon_mapping::volume::event::{EventWords, PhotonEvent};
 use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
 use clerestory::techniques::photon_mapping::{MapBuild, MappedEvent};
-use clerestory_tests::child::hash_in_child;
-use clerestory_tests::render::{builtin, cuboid};
+use clerestory_tests::child::{hash_in_child, print_hash};
+use clerestory_tests::render::{builtin, cuboid, medium, quad};
 use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::{gpu, with_gpu};
 use glam::DVec3;
@@ -15,17 +15,6 @@ use glam::DVec3;
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_EVENTS_HASH";
 const CHILD_TEST: &str = "volume::prints_its_hash_when_asked";
-
-/// A medium of extinction σ and albedo c.
-fn medium(sigma_t: f32, albedo: f32, phase: Phase) -> Medium {
-    Medium {
-        name: "medium".into(),
-        sigma_a: Vec3::splat(sigma_t * (1.0 - albedo)),
-        sigma_s: Vec3::splat(sigma_t * albedo),
-        phase,
-        ..Medium::default()
-    }
-}
 
 /// A point light of 1 W in an endless medium, with a black floor too far away for its light.
 fn endless(medium: Medium) -> Scene {
@@ -166,18 +155,16 @@ fn airlight(k: f32, z: f32, lengths: f32) -> Scene {
     };
     let black = scene.add_material(Material::lambert("black", Vec3::ZERO));
     let corner = |x: f32, y: f32| Vec3::new(4.0 * x, 4.0 * y, 4.0) * lengths;
-    scene.place(Mesh {
-        name: "wall".into(),
-        positions: vec![
+    scene.place(quad(
+        "wall",
+        black,
+        [
             corner(-1.0, -1.0),
             corner(1.0, -1.0),
             corner(1.0, 1.0),
             corner(-1.0, 1.0),
         ],
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(black),
-        ..Mesh::default()
-    });
+    ));
     scene.media.push(Medium {
         name: "fog".into(),
         sigma_a: Vec3::splat(0.05 / lengths),
@@ -207,17 +194,20 @@ fn single(volume: VolumeEstimate, radius: f32) -> PhotonSettings {
     }
 }
 
+/// Parameters of [`airlight`], and the exact radiance.
+const AIRLIGHT: [(f32, f32, f64); 6] = [
+    (0.0, 2.0, 0.0108397),
+    (0.5, 2.0, 0.0113180),
+    (-0.5, 2.0, 0.0097508),
+    (0.0, 0.0, 0.0072893),
+    (0.5, 0.0, 0.0035960),
+    (-0.5, 0.0, 0.0111230),
+];
+
 #[test]
 fn airlight_has_its_six_constants() {
     with_gpu(|gpu| {
-        for (k, z, expected) in [
-            (0.0, 2.0, 0.0108397),
-            (0.5, 2.0, 0.0113180),
-            (-0.5, 2.0, 0.0097508),
-            (0.0, 0.0, 0.0072893),
-            (0.5, 0.0, 0.0035960),
-            (-0.5, 0.0, 0.0111230),
-        ] {
+        for (k, z, expected) in AIRLIGHT {
             let scene = airlight(k, z, 1.0);
             let found = means(gpu, &scene, &single(VolumeEstimate::Ray, 0.2), 8);
             assert!(found.counts.beams.photons > 0);
@@ -245,14 +235,7 @@ fn airlight_has_its_six_constants() {
 #[test]
 fn beams_have_the_six_constants() {
     with_gpu(|gpu| {
-        for (k, z, expected) in [
-            (0.0, 2.0, 0.0108397),
-            (0.5, 2.0, 0.0113180),
-            (-0.5, 2.0, 0.0097508),
-            (0.0, 0.0, 0.0072893),
-            (0.5, 0.0, 0.0035960),
-            (-0.5, 0.0, 0.0111230),
-        ] {
+        for (k, z, expected) in AIRLIGHT {
             let scene = airlight(k, z, 1.0);
             let settings = PhotonSettings {
                 photons: 1 << 12,
@@ -265,6 +248,26 @@ fn beams_have_the_six_constants() {
             // An eighth of the photons of the beam estimate's test; the blur is that of narrower kernels.
             means(gpu, &scene, &settings, 8).expect(&scene.name, 0, 0, expected, 3e-3);
         }
+    });
+}
+
+#[test]
+fn ways_have_fewer_pieces_where_a_device_cannot_hold_all() {
+    with_gpu(|gpu| {
+        // Every way here has 32 pieces at first: 256 MiB, twice what a device must be able to bind.
+        let (k, z, expected) = AIRLIGHT[0];
+        let settings = PhotonSettings {
+            photons: 1 << 18,
+            ..single(VolumeEstimate::Beams, 0.01)
+        };
+        let found = means(gpu, &airlight(k, z, 1.0), &settings, 1);
+        let most = gpu.caps().max_storage_buffer_range / size_of::<EventWords>() as u64;
+        assert!(found.counts.photons.events <= most && found.counts.photons.events >= 1 << 18);
+        let expected = Mean {
+            value: expected,
+            variance: 0.0,
+        };
+        found.expect("beams of a pass", 0, 0, expected, 3e-3);
     });
 }
 
@@ -651,13 +654,7 @@ fn prints_its_hash_when_asked() {
         return;
     }
     let gpu = gpu();
-    let hash = bits(&hashed_picture(&gpu))
-        .iter()
-        .flat_map(|word| word.to_le_bytes())
-        .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
-    println!("hash {hash:016x}");
+    print_hash(bits(&hashed_picture(&gpu)));
     clerestory_tests::assert_no_messages(&gpu);
 }
 

@@ -6,10 +6,10 @@ use clerestory::Error;
 use clerestory::gpu::Gpu;
 use clerestory::raster::ShadowLayout;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Camera, LightKind, Material, Mesh, Projection, Scene};
+use clerestory::scene::{Camera, LightKind, Material, Projection, Scene};
 use clerestory::techniques::preview::{MirrorPlane, PlanarMirror, Preview, PreviewDesc, PreviewShadows};
 use clerestory::transport::GpuScene;
-use clerestory_hard_cases::scenes::cuboid;
+use clerestory_hard_cases::scenes::{cuboid, quad};
 use clerestory_tests::with_gpu;
 use glam::{DVec3, Vec3};
 use serde_json::json;
@@ -20,16 +20,6 @@ const PLANE: MirrorPlane = MirrorPlane {
     point: Vec3::new(0.2, 1.0, -0.8),
     normal: Vec3::new(0.25, 0.1, 1.0),
 };
-
-fn quad(name: &str, material: u32, corners: [Vec3; 4]) -> Mesh {
-    Mesh {
-        name: name.into(),
-        positions: corners.into(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(material),
-        ..Mesh::default()
-    }
-}
 
 /// A room of coloured walls, a lamp, a mirror of reflectance 1 that fills the picture, and blocks behind its plane, which must not be seen in it.
 fn room(projection: Projection) -> Scene {

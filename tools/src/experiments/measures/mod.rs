@@ -205,12 +205,12 @@ mod tests {
 
     use clerestory::gpu::Gpu;
 
-    use super::super::findings::Verdict;
+    use super::super::findings::{Judged, Verdict};
     use super::super::watch::Unwatched;
     use super::*;
 
     /// Criteria for rows that no smoke run has, since they take too long.
-    const OF_LONG_RUNS: [&str; 27] = [
+    const OF_LONG_RUNS: [&str; 20] = [
         "pilots take at most a quarter of the time of each picture where it is above five seconds: the largest share",
         "95 of 100 footprints of 256 pixels a side are within 5 %: their relative error",
         "the automatic size is within 3 % of the best by time, on scenes that judge it: best / this",
@@ -225,19 +225,12 @@ mod tests {
         "hundreds of triangles take an index: passes over index",
         "more texels with the surfaces' own angles are nearer: RMS of sixteen over that of eight",
         "in the middle the gather of sixteen is no worse than the map: RMS over its",
-        "eight bins: the greatest error of a pixel's channel",
         "channels lose copper's edge where it is met more than once: the greatest error",
         "channels keep metals without an edge: the greatest error",
         "Schlick's curve without k has the wrong colour: the greatest error for copper",
-        "the rescaled curve has the ring's colour: greatest difference of a band (%)",
-        "Schlick's curve has not: least difference of copper's green and blue (%)",
         "chromium is not: red over blue",
-        "means are those of all texels",
         "shares of low-discrepancy points err half as much as independent ones at most",
-        "warping halves the variance of textured spots at least",
         "Halton points have half the variance of independent ones at most",
-        "more points err less: wrong places with fewest points over those with most",
-        "imperfect maps of 4,096 points err three times as much as exact ones at most",
     ];
 
     /// Takes a measure with few inputs; one of functions alone must not open the device.
@@ -261,15 +254,17 @@ mod tests {
         for table in findings.tables {
             assert_eq!(table.fault(), None, "{name}: {}", table.title);
         }
-        for judged in findings.verdicts {
-            let sound = match judged.verdict {
-                Verdict::Needs(_) => true,
-                Verdict::Holds => judged.in_every_form,
-                Verdict::NotRun => OF_LONG_RUNS.contains(&judged.name.as_str()),
-                _ => judged.verdict == Verdict::SmokeForm && !judged.in_every_form,
-            };
-            assert!(sound, "{name}: {judged}");
-        }
+        let is_sound = |judged: &Judged| match judged.verdict {
+            Verdict::NotRun => OF_LONG_RUNS.contains(&judged.name.as_str()),
+            // A list that excuses what is judged would excuse it when it is no longer.
+            _ if OF_LONG_RUNS.contains(&judged.name.as_str()) => false,
+            Verdict::Needs(_) => true,
+            Verdict::Holds => judged.in_every_form,
+            _ => judged.verdict == Verdict::SmokeForm && !judged.in_every_form,
+        };
+        let unsound = findings.verdicts.iter().filter(|judged| !is_sound(judged));
+        let unsound: Vec<String> = unsound.map(|judged| judged.to_string()).collect();
+        assert!(unsound.is_empty(), "{name}: {unsound:#?}");
     }
 
     /// What the experiment says to show a row of the catalogue must be there, and a row that a table names must be one that it measures.

@@ -20,6 +20,8 @@ use crate::{Error, Result};
 
 /// Events that there is room for at first, a photon.
 const EVENTS_PER_PHOTON: u64 = 4;
+/// Pieces that a way is stored in, at most: long ones have wide boxes. Fewer where a device cannot hold as many.
+const WAY_PIECES: u32 = 32;
 
 const _: () = assert!(MEDIUM_WORD < 4 && size_of::<EventWords>() <= 32);
 
@@ -73,6 +75,7 @@ pub(in crate::techniques::photon_mapping) struct VolumeTrace {
     ways: Option<[Buffer; 3]>,
     events: TexelView,
     capacity: u32,
+    pieces_most: u32,
     slots: u32,
 }
 
@@ -138,6 +141,7 @@ impl VolumeTrace {
             scratch: work("photon volume scan", scan.scratch_bytes(slots))?,
             events: event_texels(gpu, capacity)?,
             capacity,
+            pieces_most: WAY_PIECES,
             slots,
             scan,
         })
@@ -199,6 +203,7 @@ impl VolumeTrace {
             first_deposit: told.first_deposit,
             flux_scale: told.flux_scale,
             piece: told.piece,
+            pieces_most: self.pieces_most,
             classes: told.classes,
             kernel,
         };
@@ -271,12 +276,17 @@ impl VolumeTrace {
         self.capacity
     }
 
-    /// Makes room for so many events.
+    /// Makes room for so many events, or for half the pieces of each way where the device cannot hold as many.
     ///
     /// # Errors
-    /// [`Error::Overflow`] for more than the device can hold, [`Error::OutOfMemory`].
+    /// [`Error::Overflow`] for more collisions or whole ways than the device can hold, [`Error::OutOfMemory`].
     pub fn grow(&mut self, gpu: &Gpu, needed: u32) -> Result<()> {
         let most = events_of_device(gpu);
+        let mut needed = needed;
+        if u64::from(needed) > most && self.ways.is_some() && self.pieces_most > 1 {
+            self.pieces_most /= 2;
+            needed = most as u32;
+        }
         if u64::from(needed) > most {
             return Err(Error::Overflow {
                 kernel: "photon_volume_append".into(),

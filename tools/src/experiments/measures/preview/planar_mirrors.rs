@@ -6,8 +6,9 @@ use clerestory::Result;
 use clerestory::gpu::Gpu;
 use clerestory::raster::ShadowLayout;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Camera, LightKind, Material, Mesh, Scene};
+use clerestory::scene::{Camera, LightKind, Material, Scene};
 use clerestory::techniques::preview::{MirrorPlane, PlanarMirror, Preview, PreviewDesc, PreviewShadows};
+use clerestory_hard_cases::scenes::quad;
 use glam::{DVec3, Vec3};
 use serde_json::json;
 
@@ -48,16 +49,6 @@ const CRITERIA: &[Criterion<Row>] = &[
         row.judged.into()
     }),
 ];
-
-fn quad(name: &str, material: u32, corners: [Vec3; 4]) -> Mesh {
-    Mesh {
-        name: name.into(),
-        positions: corners.into(),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        material: Some(material),
-        ..Mesh::default()
-    }
-}
 
 /// A room before a mirror of reflectance 1 that fills the picture, and the mirror's plane.
 fn room(degrees: f64) -> (Scene, MirrorPlane) {
