@@ -239,9 +239,14 @@ fn make<V: VertexShader, F: FragmentShader, G: GeometryStage>(
 ) -> Result<vk::Pipeline> {
     let modules = shaders
         .iter()
-        .map(|shader| ShaderModule::new(gpu, shader.name, shader.spirv))
+        .zip(specs)
+        .map(|(shader, spec)| ShaderModule::specialized(gpu, shader.name, shader.spirv, spec))
         .collect::<Result<Vec<_>>>()?;
-    let constants: Vec<_> = specs.iter().map(|spec| specialization_data(spec)).collect();
+    let constants: Vec<_> = modules
+        .iter()
+        .zip(specs)
+        .map(|(module, spec)| specialization_data(module.values(spec)))
+        .collect();
     let specializations: Vec<_> = constants
         .iter()
         .map(|(entries, data)| vk::SpecializationInfo::default().map_entries(entries).data(data))

@@ -11,6 +11,7 @@ use ash::vk;
 use super::caps::{Caps, DescriptorLimits};
 use super::device::Inner;
 use super::interface::{BindingKind, LocalSize, ShaderInfo, Stage};
+use super::specialize::specialize;
 use crate::{Error, Result};
 
 /// A pipeline layout with its descriptor set layouts, and the pipeline made with it. Destroyed together.
@@ -296,21 +297,48 @@ pub(super) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
 pub(super) struct ShaderModule<'a> {
     gpu: &'a Inner,
     pub raw: vk::ShaderModule,
+    is_specialized: bool,
 }
 
 impl<'a> ShaderModule<'a> {
     pub fn new(gpu: &'a Inner, name: &str, spirv: &[u8]) -> Result<Self> {
-        let words = ash::util::read_spv(&mut std::io::Cursor::new(spirv)).map_err(|error| Error::Shader {
-            name: name.into(),
-            message: error.to_string(),
-        })?;
-        let create = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words are a valid module: the build's, as the unsafe traits of shaders promise, or what a compiler of source text made.
+        Self::of_words(gpu, name, &words_of(name, spirv)?, false)
+    }
+
+    /// With the values of its constants written in where that can be done: then [`values`](Self::values) leaves none for the driver.
+    pub fn specialized(gpu: &'a Inner, name: &str, spirv: &[u8], values: &[(u32, u32)]) -> Result<Self> {
+        let words = words_of(name, spirv)?;
+        match specialize(&words, values) {
+            Some(specialized) => Self::of_words(gpu, name, &specialized, true),
+            None => Self::of_words(gpu, name, &words, false),
+        }
+    }
+
+    fn of_words(gpu: &'a Inner, name: &str, words: &[u32], is_specialized: bool) -> Result<Self> {
+        let create = vk::ShaderModuleCreateInfo::default().code(words);
+        // SAFETY: the words are a valid module: the build's, as the unsafe traits of shaders promise, or what a compiler of source text made, as it is or without
+        // what its constants exclude.
         let raw = unsafe { gpu.device.create_shader_module(&create, None) }
             .map_err(|result| gpu.error("vkCreateShaderModule", result))?;
         gpu.name(raw, name);
-        Ok(Self { gpu, raw })
+        Ok(Self {
+            gpu,
+            raw,
+            is_specialized,
+        })
     }
+
+    /// Of these values of constants, those that pipelines have to be given.
+    pub fn values<'v>(&self, values: &'v [(u32, u32)]) -> &'v [(u32, u32)] {
+        if self.is_specialized { &[] } else { values }
+    }
+}
+
+fn words_of(name: &str, spirv: &[u8]) -> Result<Vec<u32>> {
+    ash::util::read_spv(&mut std::io::Cursor::new(spirv)).map_err(|error| Error::Shader {
+        name: name.into(),
+        message: error.to_string(),
+    })
 }
 
 impl Drop for ShaderModule<'_> {

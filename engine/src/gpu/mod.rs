@@ -96,6 +96,7 @@ mod resources;
 // A method of one kernel has a kernel of its name.
 #[allow(clippy::module_inception)]
 pub mod shaders;
+mod specialize;
 mod structure;
 mod submission;
 mod surface;

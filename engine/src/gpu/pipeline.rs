@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::marker::PhantomData;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Instant;
 
 use ash::vk;
 
@@ -233,11 +234,13 @@ impl PipelineObjects {
         let create = vk::ComputePipelineCreateInfo::default()
             .stage(stage)
             .layout(self.layout);
+        let begun = Instant::now();
         // SAFETY: the caller's; the layout is alive.
         let made = unsafe {
             gpu.device
                 .create_compute_pipelines(gpu.pipeline_cache.raw, &[create], None)
         };
+        tracing::debug!(name, ms = 1e3 * begun.elapsed().as_secs_f64(), "compute pipeline");
         let made = made.map_err(|(_, result)| gpu.creation_error("vkCreateComputePipelines", result, name, 0))?;
         self.set_pipeline(made[0], name);
         Ok(())
@@ -261,8 +264,8 @@ impl PipelineInner {
             return Err(gpu.lacks_ray_queries(info.name));
         }
         let mut objects = PipelineObjects::new(gpu, &[info], 0)?;
-        let module = ShaderModule::new(gpu, info.name, spirv)?;
-        let (entries, data) = specialization_data(&spec);
+        let module = ShaderModule::specialized(gpu, info.name, spirv, &spec)?;
+        let (entries, data) = specialization_data(module.values(&spec));
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         // Widths that are not multiples of a subgroup cannot be asked for.
         let is_full =

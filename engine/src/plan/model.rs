@@ -434,49 +434,12 @@ impl PairCost {
     }
 }
 
-/// Samples per pixel that a pilot took in one go, and their seconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Run {
-    pub samples: u32,
-    pub seconds: f64,
-}
-
-/// Share of a run's time beyond which it says too little of what a sample costs.
-const FIXED_SHARE: f64 = 0.25;
-
-/// Seconds that a run of so many samples is expected to take, by the last one and a shorter one before, where the last one has taken more than a quarter of its time by
-/// itself, however few samples it had: passes over few paths take the time of passes. `None` where it says what a sample costs.
-pub fn longer_run(before: Run, last: Run, samples: u32) -> Option<f64> {
-    if last.samples <= before.samples {
-        return None;
-    }
-    let sample = (last.seconds - before.seconds).max(0.0) / f64::from(last.samples - before.samples);
-    let fixed = last.seconds - sample * f64::from(last.samples);
-    (fixed > FIXED_SHARE * last.seconds).then(|| fixed + sample * f64::from(samples))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn runs_of_few_samples_are_told_from_those_that_say_what_a_sample_costs() {
-        let run = |fixed: f64, samples: u32| Run {
-            samples,
-            seconds: fixed + 2.0 * f64::from(samples),
-        };
-        // 25 of 31, 25 of 49, and 25 of 121.
-        let longer =
-            [[1, 3, 12], [3, 12, 48], [12, 48, 192]].map(|[a, b, c]| longer_run(run(25.0, a), run(25.0, b), c));
-        assert_eq!(longer, [Some(49.0), Some(121.0), None]);
-        assert_eq!(longer_run(run(0.0, 1), run(0.0, 3), 12), None);
-        // By chance a longer run may be the faster one.
-        let faster = Run {
-            samples: 3,
-            seconds: 20.0,
-        };
-        assert_eq!(longer_run(run(25.0, 1), faster, 12), Some(20.0));
-        assert_eq!(longer_run(run(25.0, 3), run(25.0, 3), 12), None);
+    fn longer_runs_know_better_what_a_sample_costs() {
         let mut cost = PairCost::default();
         assert!(cost.measure(4, 6, 6.0 * 10.0));
         cost.measure(16, 12, 24.0);

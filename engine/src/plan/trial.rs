@@ -7,7 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
 use super::judgement::Judgement;
-use super::model::{CostModel, ErrorModel, PairCost, Run, longer_run};
+use super::model::{CostModel, ErrorModel, PairCost};
 use super::noise::{Pair, Truth, noise_of_pairs};
 use super::paths::same_picture;
 use super::{Candidate, Goal, Reference};
@@ -31,10 +31,11 @@ const UNKNOWN_RELATIVE_MSE: f64 = 1.0;
 const PATIENCE: Duration = Duration::from_millis(500);
 /// The same of the pilots behind the first one, where the stop request was there before any of them: the least that a choice takes is then done.
 const LEAST_PATIENCE: Duration = Duration::from_secs(10);
-/// Seconds that a run for the cost of a sample alone may take at most, as those before it let expect.
-const COST_SECONDS: f64 = 0.5;
-/// Seconds of a run below which the clock says too little of it.
-const SHORT_SECONDS: f64 = 0.05;
+/// Seconds that a run for the cost of a sample alone may take at most, if its samples cost what those of the one before did.
+const COST_SECONDS: f64 = 0.4;
+/// Seconds of a round that everything goes through before it is held against others, and their share of a time to keep: how the error falls shows early.
+const CHEAP_SECONDS: f64 = 0.25;
+const CHEAP_SHARE: f64 = 0.01;
 /// Sides of a pilot over those of the smaller one that tells what does not depend on pixels.
 const SMALL: u32 = 4;
 /// Distance of the pilots' seeds from the picture's and from each other.
@@ -237,6 +238,15 @@ impl<'a> Trial<'a> {
         if !trial.round(asked, ROUNDS[0])? {
             return Err(gave_up(not_first));
         }
+        let cheap = asked.goal.time.map_or(CHEAP_SECONDS, |time| {
+            CHEAP_SECONDS.min(CHEAP_SHARE * time.as_secs_f64())
+        });
+        let further = ROUNDS[1..ROUNDS.len() - 1].iter();
+        for spp in further {
+            if trial.pairs.seconds(*spp) > cheap || !trial.round(asked, *spp)? {
+                break;
+            }
+        }
         if let Some(small_seconds) = small_seconds {
             let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
             trial.fixed = fixed_share([area(small), small_seconds], [area(size), trial.first_round]);
@@ -267,7 +277,7 @@ impl<'a> Trial<'a> {
     /// sample costs.
     fn pair(&mut self, asked: &Asked<'_>, spp: u32, pair: u32) -> Result<Option<[Picture; 2]>> {
         let from = Instant::now();
-        let [mut first_seconds, mut seconds] = [0.0; 2];
+        let mut seconds = 0.0;
         let mut picture = |which: u32| -> Result<Option<(Picture, Rendering)>> {
             let mut pilot = self.begin_pilot(asked, self.size, [pair, which])?;
             let begun = Instant::now();
@@ -279,7 +289,6 @@ impl<'a> Trial<'a> {
             if !run(&mut pilot, asked)? {
                 return Ok(None);
             }
-            first_seconds += first;
             seconds += begun.elapsed().as_secs_f64() - first;
             Ok(Some((pilot.picture()?, pilot)))
         };
@@ -293,11 +302,7 @@ impl<'a> Trial<'a> {
         let knows_best = self.pairs.measure(spp, 2 * (spp - 1).max(1), seconds);
         if spp == ROUNDS[0] {
             self.first_round = 0.5 * seconds;
-            let of_one = |samples: u32, seconds: f64| Run {
-                samples,
-                seconds: 0.5 * seconds,
-            };
-            self.measure_cost(asked, pilot, [of_one(1, first_seconds), of_one(spp - 1, seconds)])?;
+            self.measure_cost(asked, pilot)?;
         }
         self.all_seconds += from.elapsed().as_secs_f64();
         if knows_best {
@@ -306,19 +311,11 @@ impl<'a> Trial<'a> {
         Ok(Some(pictures))
     }
 
-    /// Lets a pilot of the first round go on, whose runs were these, until a run's time is for the most part that of its samples: few samples of few pixels take the time
-    /// of passes.
-    fn measure_cost(
-        &mut self,
-        asked: &Asked<'_>,
-        mut pilot: Rendering,
-        [mut before, mut last]: [Run; 2],
-    ) -> Result<()> {
+    /// Lets a pilot of the first round go on as far as [`COST_SECONDS`] do: few samples of few pixels take the time of passes, however few paths these have.
+    fn measure_cost(&mut self, asked: &Asked<'_>, mut pilot: Rendering) -> Result<()> {
         for (spp, next) in ROUNDS.iter().zip(&ROUNDS[1..]) {
             let samples = next - spp;
-            let goes_on = last.seconds < SHORT_SECONDS
-                || longer_run(before, last, samples).is_some_and(|expected| expected <= COST_SECONDS);
-            if !goes_on {
+            if self.pairs.sample * f64::from(samples) > COST_SECONDS {
                 break;
             }
             pilot.set_spp(*next);
@@ -326,9 +323,7 @@ impl<'a> Trial<'a> {
             if !run(&mut pilot, asked)? {
                 break;
             }
-            let seconds = begun.elapsed().as_secs_f64();
-            (before, last) = (last, Run { samples, seconds });
-            self.pairs.measure(*next, samples, seconds);
+            self.pairs.measure(*next, samples, begun.elapsed().as_secs_f64());
         }
         Ok(())
     }
