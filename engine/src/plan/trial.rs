@@ -243,7 +243,8 @@ impl<'a> Trial<'a> {
         });
         let further = ROUNDS[1..ROUNDS.len() - 1].iter();
         for spp in further {
-            if trial.pairs.seconds(*spp) > cheap || !trial.round(asked, *spp)? {
+            let goes_on = trial.pairs.seconds(*spp) <= cheap && asked.proceeds();
+            if !goes_on || !trial.round(asked, *spp)? {
                 break;
             }
         }
