@@ -57,7 +57,8 @@ pub(super) fn event_share(
     } else {
         EVENTS_WANTED
     };
-    let mut mapper = PhotonMapper::with_event_share(gpu, Arc::clone(scene), (camera, pilot_size(size)), own, PILOT_SHARE)?;
+    let mut mapper =
+        PhotonMapper::with_event_share(gpu, Arc::clone(scene), (camera, pilot_size(size)), own, PILOT_SHARE)?;
     let mut search = ShareSearch::new(settings.event_dimensions(), wanted);
     for _ in 0..PILOT_ROUNDS {
         mapper.restart_with(PILOT_SEED, search.share)?;
