@@ -34,6 +34,7 @@ layout(push_constant, scalar) uniform Push {
     float piece;         // about how long pieces of ways are, m
     uint pieces_most;    // of a way
     uint classes[2];     // successors of each class of photons by scattering in a medium
+    float path_share;    // of kernels' radii over the mean free path of their medium at its densest, at most; 0 for any
     EventKernelSettings kernel;  // without footprints all have the greatest radius
 } push;
 
@@ -56,6 +57,12 @@ struct Footprint {
     float here;    // extinction there, of what photons collide with, 1/m
     float most;    // the same at the greatest density
 };
+
+// A radius, no more than its share of the medium's mean free path.
+float radius_in(SceneMedium m, float radius) {
+    float densest = largest_component(m.sigma_t) * (HAS_GRIDS && m.has_grid != 0u ? m.density_max : 1.0);
+    return push.path_share > 0.0 ? min(radius, push.path_share / densest) : radius;
+}
 
 // Stores the photon's way through a homogeneous medium, `reach` long.
 uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
@@ -226,7 +233,7 @@ void main() {
                 radius = event_radius(push.kernel, f.across, f.pdf, f.most);
             }
             if (!STORES_WAYS && path_set_bounce(photon.bounce) >= push.first_deposit) {
-                flags = deposit(slot, place, photon, medium, at, radius);
+                flags = deposit(slot, place, photon, medium, at, radius_in(m, radius));
             }
             alive = scatter(slot, m, before, at, f, photon);
             state.start = 0.0;

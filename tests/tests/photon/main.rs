@@ -21,6 +21,8 @@ mod settings;
 mod sphere;
 mod traps;
 mod volume;
+mod volume_kernels;
+mod volume_truths;
 
 use std::f64::consts::PI;
 

@@ -21,9 +21,10 @@ use super::card::refusals;
 use super::gather::{Gather, GatherCounts};
 use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
-use super::settings::{MapBuild, PhotonSettings};
+use super::pilot;
+use super::settings::{MapBuild, MediaLengths, PhotonSettings};
 use super::tracer::{PhotonAppend, PhotonCounts, PhotonTracer, Tracing, flux_scale};
-use super::volume::event::{EventWords, PhotonEvent, unpack_event};
+use super::volume::event::{PhotonEvent, unpack_event};
 use super::volume::footprint::EventKernelSettings;
 use super::volume::{EventMap, EventMaps};
 use crate::film::picture::{NonFiniteSamples, Picture};
@@ -95,6 +96,9 @@ pub struct PhotonMapper {
     gpu: Gpu,
     scene: Arc<GpuScene>,
     settings: PhotonSettings,
+    size: [u32; 2],
+    /// Of the automatic radius of kernels in media.
+    event_share: f64,
     eye: PathTracer,
     /// None where the picture has nothing of a map.
     photons: Option<Photons>,
@@ -127,6 +131,18 @@ impl PhotonMapper {
         camera: &Camera,
         size: [u32; 2],
         settings: PhotonSettings,
+    ) -> Result<Self> {
+        let event_share = pilot::event_share(gpu, &scene, (camera, size), &settings)?;
+        Self::with_event_share(gpu, scene, (camera, size), settings, event_share)
+    }
+
+    /// As [`PhotonMapper::new`], with a share of the automatic radius of kernels in media.
+    pub(super) fn with_event_share(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        (camera, size): (&Camera, [u32; 2]),
+        settings: PhotonSettings,
+        event_share: f64,
     ) -> Result<Self> {
         settings.check()?;
         let reasons = refusals(scene.profile());
@@ -166,9 +182,7 @@ impl PhotonMapper {
                 tracer,
                 gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), eye.slots())?,
                 maker: MapMaker::new(gpu, settings.map_build)?,
-                event_maps: has_media
-                    .then(|| EventMaps::new(gpu, settings.map_build, settings.stores_ways()))
-                    .transpose()?,
+                event_maps: has_media.then(|| EventMaps::new(gpu, &settings)).transpose()?,
                 tracing: None,
                 map: None,
                 events: None,
@@ -180,6 +194,8 @@ impl PhotonMapper {
             eye,
             scene,
             settings,
+            size,
+            event_share,
             photons,
             counts: MapperCounts::default(),
         })
@@ -228,18 +244,25 @@ impl PhotonMapper {
     /// [`Error::Setting`](crate::Error::Setting) for a camera that cannot be used, [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         self.eye.set_camera(camera)?;
+        self.event_share = pilot::event_share(&self.gpu, &self.scene, (camera, self.size), &self.settings)?;
         self.begin();
         Ok(())
     }
 
     /// Forgets everything gathered so far and begins anew with this seed, with the kernels there are: for an independent picture of the same
-    /// view, or one of another time, after a light has [moved](GpuScene::move_light).
+    /// view, or one of another time, after a light has [moved](GpuScene::move_light). The automatic radius of kernels in media stays.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn restart(&mut self, seed: u32) -> Result<()> {
+        self.restart_with(seed, self.event_share)
+    }
+
+    /// The same with a share of the automatic radius of kernels in media.
+    pub(super) fn restart_with(&mut self, seed: u32, event_share: f64) -> Result<()> {
         self.eye.restart(seed)?;
         self.settings.seed = seed;
+        self.event_share = event_share;
         if let Some(photons) = &mut self.photons {
             photons.tracer.set_seed(seed);
         }
@@ -268,6 +291,7 @@ impl PhotonMapper {
         };
         let mut timings = Vec::new();
         let (kernel, watts, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
+        let (path_share, shrunk) = (self.event_path_share(pass), self.settings.event_shrinkage(pass));
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
@@ -277,7 +301,7 @@ impl PhotonMapper {
                 photons
                     .tracer
                     .begin(pass, Some(&kernel))
-                    .with_event_kernel(event_kernel)
+                    .with_event_kernel(event_kernel, path_share)
             };
             let mut tracing = begun.unwrap_or_else(begin);
             let all = photons.tracer.advance(&mut tracing)?;
@@ -305,7 +329,7 @@ impl PhotonMapper {
             };
             if let (Some(maps), Some(events)) = (&mut photons.event_maps, photons.tracer.events()) {
                 let clock = Instant::now();
-                let (map, building) = maps.make(events, traced.events, event_kernel.length_max)?;
+                let (map, building) = maps.make(events, traced.events, &event_kernel, shrunk)?;
                 seconds += clock.elapsed().as_secs_f64();
                 if let Some(building) = building {
                     let built = building.wait()?;
@@ -402,6 +426,7 @@ impl PhotonMapper {
     /// As [`PhotonMapper::step`].
     pub fn events(&mut self, pass: u32) -> Result<Vec<MappedEvent>> {
         let (kernel, scale, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
+        let (path_share, shrunk) = (self.event_path_share(pass), self.settings.event_shrinkage(pass));
         let Some(photons) = &mut self.photons else {
             return Ok(Vec::new());
         };
@@ -409,13 +434,14 @@ impl PhotonMapper {
         let tracing = photons
             .tracer
             .begin(pass, Some(&kernel))
-            .with_event_kernel(event_kernel);
+            .with_event_kernel(event_kernel, path_share);
         let traced = photons.tracer.finish(tracing)?;
         self.counts.photons += traced.counts;
-        let Some(events) = photons.tracer.events().filter(|_| !self.settings.stores_ways()) else {
+        let events = photons.tracer.events().filter(|_| !self.settings.stores_ways());
+        let Some((maps, events)) = photons.event_maps.as_ref().zip(events) else {
             return Ok(Vec::new());
         };
-        let words: Vec<EventWords> = self.gpu.read(events.buffer().view(), traced.events as usize)?;
+        let words = maps.read(events, traced.events, &event_kernel, shrunk)?;
         let mapped = words.iter().map(|words| {
             let mut event = unpack_event(words);
             event.flux *= scale as f32;
@@ -447,16 +473,26 @@ impl PhotonMapper {
         self.settings.kernel(pass, self.diagonal(), self.scene.surface_area())
     }
 
-    /// Radius of the kernels of events in media, m, in a pass; the greatest where they follow footprints.
+    /// Radius of the kernels of events in media, m, in a pass; the greatest where media differ, or where they follow footprints or neighbours.
     pub fn event_radius(&self, pass: u32) -> f64 {
-        self.settings
-            .event_radius(pass, self.diagonal(), self.scene.greatest_extinction())
+        self.settings.event_radius(pass, &self.media_lengths())
     }
 
     /// How the kernels of events in media are made in a pass.
     pub fn event_kernel(&self, pass: u32) -> EventKernelSettings {
-        self.settings
-            .event_kernel(pass, self.diagonal(), self.scene.greatest_extinction())
+        self.settings.event_kernel(pass, &self.media_lengths())
+    }
+
+    fn event_path_share(&self, pass: u32) -> f64 {
+        self.settings.event_path_share(pass, &self.media_lengths())
+    }
+
+    fn media_lengths(&self) -> MediaLengths {
+        MediaLengths {
+            diagonal: self.diagonal(),
+            extinctions: self.scene.extinctions(),
+            share: self.event_share,
+        }
     }
 
     /// Of the scene's box, m.

@@ -8,6 +8,7 @@ mod gather;
 mod map;
 mod mapper;
 mod path_classes;
+mod pilot;
 mod queue;
 mod settings;
 mod tracer;

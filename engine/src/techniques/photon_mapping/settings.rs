@@ -32,6 +32,25 @@ const QUERY_QUOTA: u32 = 32_768;
 /// Least length of an axis in unit lengths.
 const LENGTH_MIN: f64 = 1e-3;
 
+/// Lengths of a scene that kernels in its media are chosen by.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MediaLengths {
+    /// Of the scene's box, m; 0 without surfaces.
+    pub diagonal: f64,
+    /// As [`GpuScene::extinctions`](crate::transport::GpuScene::extinctions).
+    pub extinctions: Option<[f64; 2]>,
+    /// Of the automatic radius, what a pilot has left.
+    pub share: f64,
+}
+
+impl MediaLengths {
+    /// Mean free path of the densest medium, or of the thinnest one, m; a metre where none scatters, since nothing is seen there.
+    fn free_path(&self, of_densest: bool) -> f64 {
+        self.extinctions
+            .map_or(1.0, |range| 1.0 / range[usize::from(of_densest)])
+    }
+}
+
 /// How points are looked up in the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -113,12 +132,12 @@ crate::settings! {
         /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or whole ways, in
         /// homogeneous media alone.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
-        /// Kernels of photons in media have one radius, or that of each photon's footprint.
+        /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
-        /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by the size of the scene.
+        /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.
         ///
-        /// 0 stands for a fiftieth of the scene's diagonal for fixed kernels, or a quarter of the least mean free path if that is less, and for a ninth of the diagonal for
-        /// others.
+        /// 0 stands for the radius of fixed kernels under which rays meet some tens of them, which a small picture of few photons finds out, at most a fiftieth of the scene's diagonal
+        /// and in each medium a quarter of its mean free path; and for a ninth of the diagonal for others.
         pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
         /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
@@ -157,11 +176,15 @@ crate::settings! {
         /// [`WalkOptions::work`](crate::walk::WalkOptions::work); 0 chooses by the kind of device. Never changes the picture.
         pub submission_work: u64 = 0;
     }
-    check PhotonSettings::sees_direct_light_once;
+    check PhotonSettings::fits_together;
 }
 
 impl PhotonSettings {
-    fn sees_direct_light_once(&self) -> Result<()> {
+    fn fits_together(&self) -> Result<()> {
+        if self.stores_ways() && self.volume_kernel != VolumeKernel::Fixed {
+            let cause = "cannot be combined with \"volume\": \"beams\", which have one radius: take \"fixed\"";
+            return Err(Error::setting("volume_kernel", self.volume_kernel.word(), cause));
+        }
         if self.direct_photons && self.final_gather {
             let cause = "cannot be combined with direct_photons: direct light would be seen twice";
             return Err(Error::setting("final_gather", true, cause));
@@ -219,36 +242,59 @@ impl PhotonSettings {
         }
     }
 
-    /// Radius of the kernels of events in media, m, in a pass, in a scene of that diagonal and greatest extinction, 1/m: the area of disks, the width of beams or the volume of balls falls from pass to pass as
+    /// Greatest radius of the kernels of events in media, m, in a pass: the area of disks, the width of beams or the volume of balls falls from pass to pass as
     /// [`reduction`](PhotonSettings::reduction) says.
     ///
     /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011.
-    pub(super) fn event_radius(&self, pass: u32, diagonal: f64, extinction: f64) -> f64 {
-        // Within a boundary's reach events lack on one side, which must be little of a mean free path.
-        let by_medium = match self.volume_kernel {
-            VolumeKernel::Fixed if extinction > 0.0 => PATH_SHARE / extinction,
-            _ => f64::INFINITY,
-        };
-        let share = match self.volume_kernel {
-            VolumeKernel::Fixed => RADIUS_SHARE,
-            VolumeKernel::Footprint => UNIT_SHARE,
-        };
-        let first = match f64::from(self.volume_radius) {
-            0.0 if diagonal > 0.0 => by_medium.min(share * diagonal),
-            0.0 => by_medium.min(1.0),
-            set => set,
+    pub(super) fn event_radius(&self, pass: u32, lengths: &MediaLengths) -> f64 {
+        // Beams have one radius in all media, events each medium's own.
+        let free_path = lengths.free_path(self.stores_ways());
+        let first = match (f64::from(self.volume_radius), self.volume_kernel) {
+            (0.0, VolumeKernel::Fixed) => {
+                let by_path = PATH_SHARE * free_path;
+                let by_scene = RADIUS_SHARE * lengths.diagonal;
+                lengths.share * if by_scene > 0.0 { by_path.min(by_scene) } else { by_path }
+            }
+            (0.0, VolumeKernel::Footprint | VolumeKernel::Neighbor) => self.event_unit_length(lengths),
+            (set, _) => set,
         };
         first * self.event_shrinkage(pass)
     }
 
-    /// Radius of events' kernels in a pass relative to the first.
-    fn event_shrinkage(&self, pass: u32) -> f64 {
-        let shrunk = shrinkage(pass, f64::from(self.reduction));
-        match self.volume {
-            VolumeEstimate::Beams => shrunk.powi(2),
-            VolumeEstimate::Ray => shrunk,
-            VolumeEstimate::March => shrunk.powf(2.0 / 3.0),
+    /// Radius of the kernels of events over the mean free path of their medium where it is densest, at most, in a pass; 0 for any.
+    ///
+    /// Within a boundary's reach events lack on one side, which must be little of a mean free path.
+    pub(super) fn event_path_share(&self, pass: u32, lengths: &MediaLengths) -> f64 {
+        if self.radius_is_automatic() && !self.stores_ways() {
+            PATH_SHARE * lengths.share * self.event_shrinkage(pass)
+        } else {
+            0.0
         }
+    }
+
+    /// Whether the radius of kernels in media is for a pilot to choose.
+    pub(super) fn radius_is_automatic(&self) -> bool {
+        self.volume_radius == 0.0 && self.volume_kernel == VolumeKernel::Fixed
+    }
+
+    /// Unit of lengths for kernels in media that follow footprints, m.
+    fn event_unit_length(&self, lengths: &MediaLengths) -> f64 {
+        match f64::from(self.unit_length) {
+            0.0 if lengths.diagonal > 0.0 => UNIT_SHARE * lengths.diagonal,
+            0.0 => lengths.free_path(false),
+            set => set,
+        }
+    }
+
+    /// Power of the width of kernels in media with which the number that a ray meets goes, where they lie evenly: disks and balls by their area, beams by their width.
+    pub(super) fn event_dimensions(&self) -> f64 {
+        if self.stores_ways() { 1.0 } else { 2.0 }
+    }
+
+    /// Radius of events' kernels in a pass relative to the first.
+    pub(super) fn event_shrinkage(&self, pass: u32) -> f64 {
+        let shrunk = shrinkage(pass, f64::from(self.reduction));
+        shrunk.powf(2.0 / self.volume.dimensions())
     }
 
     /// Whether the ways of photons through media are stored, instead of their collisions.
@@ -256,24 +302,17 @@ impl PhotonSettings {
         self.volume == VolumeEstimate::Beams
     }
 
-    /// Kernels of events in media in a pass, in a scene of that diagonal, m.
-    pub(super) fn event_kernel(&self, pass: u32, diagonal: f64, extinction: f64) -> EventKernelSettings {
-        let unit_length = match f64::from(self.unit_length) {
-            0.0 if diagonal > 0.0 => UNIT_SHARE * diagonal,
-            0.0 => 1.0,
-            set => set,
-        };
-        let (length_max, shrunk) = (
-            self.event_radius(pass, diagonal, extinction),
-            self.event_shrinkage(pass),
-        );
+    /// Kernels of events in media in a pass.
+    pub(super) fn event_kernel(&self, pass: u32, lengths: &MediaLengths) -> EventKernelSettings {
+        let unit_length = self.event_unit_length(lengths);
+        let (length_max, shrunk) = (self.event_radius(pass, lengths), self.event_shrinkage(pass));
         EventKernelSettings {
             spread: f64::from(self.volume_spread) * event_step(f64::from(self.photons)) * shrunk,
             dampening: f64::from(self.volume_dampening),
             unit_length,
             length_min: match self.volume_kernel {
                 VolumeKernel::Fixed => length_max,
-                VolumeKernel::Footprint => (LENGTH_MIN * unit_length * shrunk).min(length_max),
+                VolumeKernel::Footprint | VolumeKernel::Neighbor => (LENGTH_MIN * unit_length * shrunk).min(length_max),
             },
             length_max,
         }

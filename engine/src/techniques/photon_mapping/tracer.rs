@@ -198,6 +198,8 @@ pub(in crate::techniques) struct Tracing {
     kernel: Option<KernelSettings>,
     /// Kernels of events in media, if there are some.
     event_kernel: Option<EventKernelSettings>,
+    /// [`VolumePass::path_share`].
+    path_share: f64,
     /// First photon of the wave under way, or of the next one.
     first_photon: u32,
     wave: Option<(WalkKey, WaveInFlight)>,
@@ -210,10 +212,11 @@ impl Tracing {
         std::mem::take(&mut self.traced.timings)
     }
 
-    /// With kernels so made for events in media.
-    pub fn with_event_kernel(self, kernel: EventKernelSettings) -> Self {
+    /// With kernels so made for events in media, at most that share of a mean free path wide.
+    pub fn with_event_kernel(self, kernel: EventKernelSettings, path_share: f64) -> Self {
         Self {
             event_kernel: Some(kernel),
+            path_share,
             ..self
         }
     }
@@ -263,6 +266,7 @@ struct PhotonStages<'a> {
     first_event: u32,
     kernel: Option<&'a KernelSettings>,
     event_kernel: Option<&'a EventKernelSettings>,
+    path_share: f64,
 }
 
 impl PhotonTracer {
@@ -403,6 +407,7 @@ impl PhotonTracer {
             pass,
             kernel: kernel.copied(),
             event_kernel: None,
+            path_share: 0.0,
             first_photon: 0,
             wave: None,
             traced: Traced::default(),
@@ -435,6 +440,7 @@ impl PhotonTracer {
             first_event: tracing.traced.events,
             kernel: tracing.kernel.as_ref(),
             event_kernel: tracing.event_kernel.as_ref(),
+            path_share: tracing.path_share,
         };
         self.walker.advance(wave, &mut stages)?;
         tracing.traced.timings.append(&mut wave.take_timings());
@@ -558,6 +564,7 @@ impl WalkStages for PhotonStages<'_> {
                 piece: WAY_PIECE_SHARE * (upper - lower).length(),
                 classes: kit.classes.as_ref().map_or([0; 2], |(_, in_media)| *in_media),
                 kernel: self.event_kernel.copied(),
+                path_share: self.path_share as f32,
             };
             recorder.pass("photon: medium", |pass| {
                 volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)

@@ -24,8 +24,8 @@ pub(super) struct GpuMedia {
     majorants: TexelView,
     /// The medium outside all bodies.
     pub(super) surrounding: Option<u32>,
-    /// Of any band of any medium at its densest, 1/m.
-    pub(super) greatest_extinction: f64,
+    /// Of media that scatter, at their densest: of the least and of the densest of them, 1/m.
+    pub(super) extinctions: Option<[f64; 2]>,
 }
 
 impl GpuMedia {
@@ -43,8 +43,13 @@ impl GpuMedia {
             let density = medium.density.as_ref().map_or(1.0, |grid| grid.max());
             f64::from(medium.sigma_t().max_element()) * f64::from(density)
         };
+        let scattering = scene.media.iter().filter(|medium| medium.sigma_s != Vec3::ZERO);
+        let extinctions = scattering.map(greatest).filter(|extinction| *extinction > 0.0);
         Ok(Self {
-            greatest_extinction: scene.media.iter().map(greatest).fold(0.0, f64::max),
+            extinctions: extinctions.fold(None, |range, extinction| {
+                let [least, most] = range.unwrap_or([extinction; 2]);
+                Some([least.min(extinction), most.max(extinction)])
+            }),
             records: gpu.texels_with("media", Category::Material, format, bytes)?,
             densities: texels("densities", &densities)?,
             majorants: texels("majorants", &majorants)?,

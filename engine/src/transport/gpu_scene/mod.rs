@@ -426,9 +426,10 @@ impl GpuScene {
         )
     }
 
-    /// The greatest extinction coefficient of any band anywhere in participating media, 1/m; 0 without any.
-    pub fn greatest_extinction(&self) -> f64 {
-        self.media.as_ref().map_or(0.0, |media| media.greatest_extinction)
+    /// Of each of the participating media that scatter the greatest extinction coefficient of any band anywhere, 1/m: the least and the greatest of these; `None`
+    /// without any.
+    pub fn extinctions(&self) -> Option<[f64; 2]> {
+        self.media.as_ref()?.extinctions
     }
 
     /// Index of the medium outside all bodies, if there is one that does something.

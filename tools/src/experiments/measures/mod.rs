@@ -181,6 +181,7 @@ measures! {
     on_device "technique-choice" rendering::technique_choice;
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
+    on_device "volume-bandwidths" photons::volume_bandwidths;
     on_host "vpl-order" virtual_lights::vpl_order;
     on_device "vpl-potential" virtual_lights::vpl_potential;
     on_host "vpl-walks" virtual_lights::vpl_walks;

@@ -61,6 +61,11 @@ pub fn unpack_event(words: &EventWords) -> PhotonEvent {
     }
 }
 
+/// Gives a record another radius, m.
+pub(super) fn set_event_radius(words: &mut EventWords, radius: f32) {
+    words[1][1] = radius.to_bits();
+}
+
 /// Whether the record is the last one of a leaf.
 pub fn event_ends_leaf(words: &EventWords) -> bool {
     words[0][MEDIUM_WORD] & EVENT_LEAF_END != 0

@@ -4,7 +4,10 @@
 //!
 //! Guarantees: a ray's query visits every kernel that it pierces; the same bytes on any number of threads, by host and device.
 
-use super::event::{EventWords, MEDIUM_WORD, event_box, unpack_beam, unpack_event};
+use super::VolumeKernel;
+use super::event::{EventWords, MEDIUM_WORD, event_box, set_event_radius, unpack_beam, unpack_event};
+use super::footprint::EventKernelSettings;
+use super::neighbor::{NEIGHBORS, neighbor_radii};
 use crate::accel::Aabb;
 use crate::accel::lbvh::SortedCodes;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
@@ -19,7 +22,7 @@ use crate::gpu::shaders::constants::{
 use crate::gpu::shaders::techniques::photon_mapping::{photon_event_boxes, photon_event_leaves};
 use crate::gpu::shaders::types::CompactRoot;
 use crate::gpu::{Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Submission, TexelView};
-use crate::techniques::photon_mapping::settings::MapBuild;
+use crate::techniques::photon_mapping::settings::{MapBuild, PhotonSettings};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -45,6 +48,8 @@ pub(in crate::techniques::photon_mapping) struct EventMaps {
     or_host: bool,
     /// Records are pieces of ways.
     beams: bool,
+    /// Kernels are as wide as neighbours are far, which the host finds.
+    by_neighbors: bool,
 }
 
 struct DeviceEventMaps {
@@ -57,8 +62,11 @@ struct DeviceEventMaps {
 impl EventMaps {
     /// # Errors
     /// As [`Gpu::compute_pipeline`].
-    pub fn new(gpu: &Gpu, build: MapBuild, beams: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, settings: &PhotonSettings) -> Result<Self> {
+        let (build, beams) = (settings.map_build, settings.stores_ways());
+        let by_neighbors = settings.volume_kernel == VolumeKernel::Neighbor;
         let device = match build {
+            _ if by_neighbors => None,
             MapBuild::Host => None,
             MapBuild::Auto | MapBuild::Device => Some(DeviceEventMaps {
                 builder: MapBuilder::new(gpu)?,
@@ -72,6 +80,7 @@ impl EventMaps {
             device,
             or_host: build == MapBuild::Auto,
             beams,
+            by_neighbors,
         })
     }
 
@@ -83,20 +92,50 @@ impl EventMaps {
         all
     }
 
-    /// A map of the first `count` of `events`, and the submission that builds it, if the device does. Maps of beams are told their radius, m.
+    /// A map of the first `count` of `events`, and the submission that builds it, if the device does. Kernels that the trace has not made are made so: those of
+    /// beams, and those by neighbours, of which the share `shrunk` is left.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] for more events than the device can build over where it is to, [`Error::OutOfMemory`], [`Error::DeviceLost`].
-    pub fn make(&mut self, events: &TexelView, count: u32, radius: f64) -> Result<(EventMap, Option<Submission>)> {
-        let radius = radius as f32;
+    pub fn make(
+        &mut self,
+        events: &TexelView,
+        count: u32,
+        kernel: &EventKernelSettings,
+        shrunk: f64,
+    ) -> Result<(EventMap, Option<Submission>)> {
+        let radius = kernel.length_max as f32;
         if let Some(device) = self.device.as_mut().filter(|_| count > 0) {
             match device.build(&self.gpu, events, count, radius) {
                 Err(Error::LimitExceeded { .. } | Error::OutOfMemory { .. }) if self.or_host => {}
                 built => return built.map(|(map, submission)| (map, Some(submission))),
             }
         }
-        let words: Vec<EventWords> = self.gpu.read(events.buffer().view(), count as usize)?;
+        let words = self.read(events, count, kernel, shrunk)?;
         Ok((self.by_host(&words, radius)?, None))
+    }
+
+    /// The first `count` of `events`, with their kernels.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], [`Error::DeviceLost`], [`Error::LimitExceeded`] for more events than neighbours can be found among.
+    pub fn read(
+        &self,
+        events: &TexelView,
+        count: u32,
+        kernel: &EventKernelSettings,
+        shrunk: f64,
+    ) -> Result<Vec<EventWords>> {
+        let mut words: Vec<EventWords> = self.gpu.read(events.buffer().view(), count as usize)?;
+        if self.by_neighbors {
+            let places: Vec<_> = words.iter().map(unpack_event).map(|e| (e.position, e.medium)).collect();
+            let radii = neighbor_radii(&places, NEIGHBORS, (kernel.length_max / shrunk) as f32)?;
+            for (words, radius) in words.iter_mut().zip(radii) {
+                let shrunk = f64::from(radius) * shrunk;
+                set_event_radius(words, shrunk.max(kernel.length_min) as f32);
+            }
+        }
+        Ok(words)
     }
 
     fn by_host(&self, events: &[EventWords], radius: f32) -> Result<EventMap> {

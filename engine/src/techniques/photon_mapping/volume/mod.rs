@@ -12,6 +12,7 @@ mod beam;
 pub mod event;
 pub mod footprint;
 mod map;
+pub mod neighbor;
 mod trace;
 
 pub(super) use beam::{Beam, BeamAsk, BeamStage};
@@ -32,6 +33,17 @@ pub enum VolumeEstimate {
     March,
 }
 
+impl VolumeEstimate {
+    /// Of its kernels.
+    pub(super) fn dimensions(self) -> f64 {
+        match self {
+            Self::Beams => 1.0,
+            Self::Ray => 2.0,
+            Self::March => 3.0,
+        }
+    }
+}
+
 /// How wide events' kernels are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -40,6 +52,19 @@ pub enum VolumeKernel {
     Fixed,
     /// As the photon's footprint is.
     Footprint,
+    /// As far as the [`NEIGHBORS`](neighbor::NEIGHBORS)-th nearest of the other events in its medium.
+    Neighbor,
+}
+
+impl VolumeKernel {
+    /// As settings spell it.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Fixed => "fixed",
+            Self::Footprint => "footprint",
+            Self::Neighbor => "neighbor",
+        }
+    }
 }
 
 const BIAS: Bias = Bias::Consistent(
@@ -78,6 +103,13 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::errors_fall_with_passes",
             "tests/tests/photon/volume.rs::lengths_times_eight_give_a_sixty_fourth",
             "tests/tests/photon/volume.rs::beams_that_a_quota_stops_go_through_all_records",
+            "engine/src/techniques/photon_mapping/pilot.rs::shares_are_found_whatever_the_law",
+            "tests/tests/photon/volume_kernels.rs::rays_meet_some_tens_of_kernels",
+            "tests/tests/photon/volume_kernels.rs::radii_scale_with_the_scene",
+            "tests/tests/photon/volume_kernels.rs::dense_bodies_elsewhere_leave_kernels_as_they_are",
+            "tests/tests/photon/volume_truths.rs::slabs_have_the_radiance_of_the_tables",
+            "tests/tests/photon/volume_truths.rs::rays_past_a_source_have_the_exact_multiple_scattering",
+            "tests/tests/photon/volume_truths.rs::furnaces_stay_even_with_lossless_media_inside",
         ],
         settings: &["volume", "volume_radius", "reduction"],
         ..Row::of(file!())
@@ -97,6 +129,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/volume/event.rs::beams_have_the_airlight_integral",
             "tests/tests/photon/volume.rs::beams_have_the_six_constants",
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
+            "tests/tests/photon/volume_kernels.rs::beams_have_no_kernels_of_their_own",
+            "tests/tests/photon/volume_truths.rs::slabs_have_the_radiance_of_the_tables",
             "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
         ],
         settings: &["volume"],
@@ -137,6 +171,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/photon/volume.rs::photons_in_media_are_kept_to_the_count",
             "tests/tests/photon/volume.rs::collisions_are_as_many_as_the_albedo_says",
+            "tests/tests/photon/volume_truths.rs::collisions_about_a_source_are_those_of_the_exact_fluence",
             "tests/tests/photon/volume.rs::scenes_without_media_have_nothing_of_it",
             "tests/tests/photon/volume.rs::threads_never_show_in_media",
         ],
@@ -162,6 +197,25 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
         ],
         settings: &["volume_kernel", "volume_spread", "volume_dampening"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-VOL-8",
+        name: "kernels in media as wide as the 85th neighbour is far",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "The host finds neighbours, which takes longer than all the rest of a pass; a baseline for kernels from footprints.",
+        sources: &[
+            sources::FABIANOWSKI_2011.at("§7.3.4"),
+            sources::JENSEN_CHRISTENSEN_1998.whole(),
+        ],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/photon_beam.comp"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/neighbor.rs::radii_are_those_of_all_pairs",
+            "tests/tests/photon/volume_kernels.rs::kernels_by_neighbours_hold_so_many",
+            "tests/tests/photon/volume_kernels.rs::rays_see_the_kernels_that_events_have",
+        ],
+        settings: &["volume_kernel"],
         ..Row::of(file!())
     },
 ];

@@ -38,6 +38,8 @@ pub(in crate::techniques::photon_mapping) struct VolumePass {
     /// Successors of classes by scattering in media, where photons have some.
     pub classes: [u32; 2],
     pub kernel: Option<EventKernelSettings>,
+    /// Radius of kernels over the mean free path of their medium where it is densest, at most; 0 for any.
+    pub path_share: f32,
 }
 
 /// What photons in media are specialized to.
@@ -205,6 +207,7 @@ impl VolumeTrace {
             piece: told.piece,
             pieces_most: self.pieces_most,
             classes: told.classes,
+            path_share: told.path_share,
             kernel,
         };
         let (set, of_scene, media) = (self.set(differentials), scene.scene_set(), scene.media_set());

@@ -1,0 +1,285 @@
+//! How wide kernels in media are: what a pilot chooses, each medium's own, and those by neighbours.
+
+use super::volume::{airlight, all_events, endless, lit_box, single, uneven};
+use super::*;
+use clerestory::Error;
+use clerestory::accel::sphere::closest_approach;
+use clerestory::scene::{Phase, Projection};
+use clerestory::techniques::photon_mapping::kernel::kernel_profile;
+use clerestory::techniques::photon_mapping::volume::neighbor::NEIGHBORS;
+use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
+use clerestory::transport::phase::phase_function;
+use clerestory_tests::render::{builtin, cuboid, medium};
+use clerestory_tests::with_gpu;
+use glam::{DAffine3, DVec3};
+
+const ESTIMATES: [VolumeEstimate; 3] = [VolumeEstimate::Ray, VolumeEstimate::March, VolumeEstimate::Beams];
+
+fn automatic(volume: VolumeEstimate, photons: u32) -> PhotonSettings {
+    PhotonSettings {
+        volume,
+        photons,
+        ..settings("all")
+    }
+}
+
+/// Kernels that a way through media meets in the first pass.
+fn met(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings) -> f64 {
+    let mut mapper = mapper(gpu, scene, settings);
+    advance(&mut mapper, 1);
+    let beams = mapper.counts().beams;
+    beams.photons as f64 / beams.queries as f64
+}
+
+#[test]
+fn rays_meet_some_tens_of_kernels() {
+    with_gpu(|gpu| {
+        for volume in ESTIMATES {
+            // A fiftieth of the walls' diagonal, or a quarter of the free path, has rays meet thousands of them.
+            let scene = builtin("builtin:point-in-fog");
+            let found = met(gpu, &scene, &automatic(volume, 1 << 14));
+            println!("{volume:?}: {found:.1} kernels a ray");
+            assert!((32.0..128.0).contains(&found), "{volume:?}: {found}");
+        }
+        // In a grid about the light, and where more photons are asked for than the pilot has.
+        let mut scene = lit_box(uneven(medium(2.0, 0.9, Phase::Isotropic)));
+        scene.lights.clear();
+        add_point(&mut scene, Vec3::new(0.1, 0.05, 0.0), Vec3::ONE);
+        let found = met(gpu, &scene, &automatic(VolumeEstimate::Ray, 1 << 16));
+        println!("grid: {found:.1} kernels a ray");
+        assert!((32.0..128.0).contains(&found), "grid: {found}");
+    });
+}
+
+#[test]
+fn radii_are_the_same_for_every_seed_and_grow_beyond_no_bound() {
+    with_gpu(|gpu| {
+        let scene = builtin("builtin:point-in-fog");
+        let of = |seed, photons| {
+            let settings = PhotonSettings {
+                seed,
+                ..automatic(VolumeEstimate::Ray, photons)
+            };
+            mapper(gpu, &scene, &settings).event_radius(0)
+        };
+        let radius = of(1, 1 << 12);
+        assert_eq!(radius, of(2, 1 << 12));
+        // Few photons leave a quarter of a free path, 10 m.
+        assert!((of(1, 1) - 2.5).abs() < 1e-6 && radius < 2.5);
+        // Another beginning is that of another mapper.
+        let settings = automatic(VolumeEstimate::Ray, 1 << 12);
+        let mut moved = mapper(gpu, &scene, &settings);
+        let mut camera = scene.cameras[0].clone();
+        camera.transform.translation *= 0.1;
+        moved.set_camera(&camera).unwrap_or_else(|error| panic!("{error}"));
+        let mut near = scene.clone();
+        near.cameras[0] = camera;
+        let fresh = mapper(gpu, &near, &settings).event_radius(0);
+        assert_eq!(moved.event_radius(0), fresh);
+        assert_ne!(fresh, radius);
+    });
+}
+
+/// A scene with its media, lights and camera, all lengths multiplied.
+fn scaled(scene: &Scene, by: f64) -> Scene {
+    let mut scene = scene.clone();
+    clerestory_hard_cases::scenes::transform(&mut scene, DAffine3::from_scale(DVec3::splat(by)));
+    for camera in &mut scene.cameras {
+        if let Projection::Orthographic { half_height } = &mut camera.projection {
+            *half_height *= by as f32;
+        }
+    }
+    for light in &mut scene.lights {
+        if let LightKind::Point { position, intensity } = &mut light.kind {
+            *position *= by as f32;
+            *intensity *= (by * by) as f32;
+        }
+    }
+    for medium in &mut scene.media {
+        medium.sigma_s /= by as f32;
+        medium.sigma_a /= by as f32;
+        if let Some(grid) = &mut medium.density {
+            grid.to_world = DAffine3::from_scale(DVec3::splat(by)) * grid.to_world;
+        }
+    }
+    scene
+}
+
+#[test]
+fn radii_scale_with_the_scene() {
+    with_gpu(|gpu| {
+        let grid = lit_box(uneven(medium(6.0, 0.9, Phase::Isotropic)));
+        // Without a surface there is no length but that of the free path.
+        let open = builtin("builtin:point-in-fog?wall=none");
+        for (scene, volume, kernel) in [
+            (&grid, VolumeEstimate::Ray, VolumeKernel::Fixed),
+            (&open, VolumeEstimate::Ray, VolumeKernel::Fixed),
+            (&open, VolumeEstimate::Beams, VolumeKernel::Fixed),
+            (&open, VolumeEstimate::March, VolumeKernel::Footprint),
+        ] {
+            let settings = PhotonSettings {
+                volume_kernel: kernel,
+                ..automatic(volume, 1 << 12)
+            };
+            let of = |by: f64| {
+                let mut mapper = mapper(gpu, &scaled(scene, by), &settings);
+                (mapper.event_radius(0) / by, sums(&advance(&mut mapper, 1))[0])
+            };
+            let (radius, whole) = of(1.0);
+            for by in [1e-3, 1e3] {
+                let (found, sum) = of(by);
+                let what = format!("{}, {volume:?}, {kernel:?}, times {by}", scene.name);
+                println!("{what}: {found}, {radius}; {sum:?}, {whole:?}");
+                assert!((found / radius - 1.0).abs() < 1e-4, "{what}: {found} {radius}");
+                assert!((sum[0] / whole[0] - 1.0).abs() < 1e-4, "{what}: {sum:?} {whole:?}");
+            }
+        }
+    });
+}
+
+#[test]
+fn dense_bodies_elsewhere_leave_kernels_as_they_are() {
+    with_gpu(|gpu| {
+        let fog = lit_box(medium(2.0, 0.8, Phase::Isotropic));
+        let mut both = fog.clone();
+        both.media.push(medium(1e3, 0.8, Phase::Isotropic));
+        let boundary = both.add_material(Material {
+            name: "boundary of what is dense".into(),
+            boundary: true,
+            interior: Some(1),
+            ..Material::default()
+        });
+        // On the floor below the light, away from what is seen.
+        let (low, high) = (Vec3::new(0.8, -0.55, 0.2), Vec3::new(1.2, -0.3, 0.6));
+        both.place(cuboid("dense", boundary, low, high));
+        let radii = |scene: &Scene, medium: u32| -> Vec<f32> {
+            let settings = PhotonSettings {
+                photons: 512,
+                ..automatic(VolumeEstimate::Ray, 512)
+            };
+            let (events, _) = all_events(gpu, scene, &settings, 0);
+            let of_medium = events.iter().filter(|e| e.event.medium == medium);
+            of_medium.map(|e| e.event.radius).collect()
+        };
+        let (alone, beside, dense) = (radii(&fog, 0), radii(&both, 0), radii(&both, 1));
+        assert!(!alone.is_empty() && !beside.is_empty() && !dense.is_empty());
+        assert!(
+            alone.iter().chain(&beside).all(|radius| *radius == alone[0]),
+            "{} {}",
+            alone[0],
+            beside[0]
+        );
+        // A quarter of a free path there.
+        assert!(
+            dense.iter().all(|radius| (radius / 0.25e-3 - 1.0).abs() < 1e-4),
+            "{}",
+            dense[0]
+        );
+    });
+}
+
+#[test]
+fn beams_have_no_kernels_of_their_own() {
+    with_gpu(|gpu| {
+        for volume_kernel in [VolumeKernel::Footprint, VolumeKernel::Neighbor] {
+            let settings = PhotonSettings {
+                volume_kernel,
+                ..automatic(VolumeEstimate::Beams, 1)
+            };
+            let scene = lit_box(medium(1.0, 0.5, Phase::Isotropic));
+            match PhotonMapper::new(gpu, upload(gpu, &scene), &scene.cameras[0], SIZE, settings) {
+                Err(Error::Setting { name, .. }) => assert_eq!(name, "volume_kernel"),
+                Err(other) => panic!("{other}"),
+                Ok(_) => panic!("{volume_kernel:?} was accepted"),
+            }
+        }
+    });
+}
+
+#[test]
+fn kernels_by_neighbours_hold_so_many() {
+    with_gpu(|gpu| {
+        let scene = endless(medium(1.0, 0.5, Phase::Isotropic));
+        let settings = PhotonSettings {
+            volume_kernel: VolumeKernel::Neighbor,
+            volume_radius: 1e3,
+            direct_photons: true,
+            reduction: 2.0 / 3.0,
+            ..automatic(VolumeEstimate::Ray, 1 << 10)
+        };
+        let (events, _) = all_events(gpu, &scene, &settings, 0);
+        assert!(events.len() > 1500);
+        for event in events.iter().step_by(31).map(|e| e.event) {
+            let others = events
+                .iter()
+                .filter(|other| other.event.position.distance(event.position) < event.radius);
+            // Itself, and all before the last one, which lies on the rim.
+            let inside = others.count();
+            assert!(inside.abs_diff(NEIGHBORS) <= 1, "{inside}");
+        }
+        // A later pass has other photons and narrower kernels.
+        let (later, _) = all_events(gpu, &scene, &settings, 9);
+        let mean = |events: &[clerestory::techniques::photon_mapping::MappedEvent]| {
+            events.iter().map(|e| f64::from(e.event.radius).ln()).sum::<f64>() / events.len() as f64
+        };
+        let kept: f64 = (1..=9)
+            .map(|i| (f64::from(i) + 2.0 / 3.0) / (f64::from(i) + 1.0))
+            .product();
+        let ratio = (mean(&later) - mean(&events)).exp();
+        assert!((ratio / kept.sqrt() - 1.0).abs() < 0.05, "{ratio} {}", kept.sqrt());
+    });
+}
+
+#[test]
+fn rays_see_the_kernels_that_events_have() {
+    with_gpu(|gpu| {
+        let scene = airlight(0.5, 2.0, 1.0);
+        for volume_kernel in [VolumeKernel::Fixed, VolumeKernel::Footprint, VolumeKernel::Neighbor] {
+            let settings = PhotonSettings {
+                volume_kernel,
+                ..single(VolumeEstimate::Ray, 0.6)
+            };
+            let settings = PhotonSettings {
+                photons: 1 << 11,
+                ..settings
+            };
+            let (events, _) = all_events(gpu, &scene, &settings, 0);
+            // Coefficients of 0.1 and 0.05, a wall 4 m away.
+            let seen = events.iter().map(|e| e.event).filter_map(|e| {
+                let near = closest_approach(DVec3::ZERO, DVec3::Z, e.position.as_dvec3());
+                let h = f64::from(e.radius);
+                let phase = phase_function(
+                    Phase::Schlick { k: 0.5 },
+                    e.direction.as_dvec3().normalize(),
+                    DVec3::NEG_Z,
+                );
+                let weight = kernel_profile(KernelProfile::Epanechnikov, near.distance_squared / (h * h)) / (h * h);
+                (near.t > 0.0 && near.t < 4.0).then_some(weight * (-0.15 * near.t).exp() * phase * f64::from(e.flux.x))
+            });
+            let expected: f64 = seen.sum();
+            let found = sums(&photons(gpu, &scene, &settings, 1))[0][0] / pixels(0);
+            println!("{volume_kernel:?}: {found:.6}, by its events {expected:.6}");
+            assert!(
+                expected > 5e-3 && (found / expected - 1.0).abs() < 1e-4,
+                "{volume_kernel:?}: {found} {expected}"
+            );
+        }
+    });
+}
+
+#[test]
+fn the_pilot_leaves_the_airlight_as_it_is() {
+    with_gpu(|gpu| {
+        let scene = airlight(0.0, 2.0, 1.0);
+        let settings = PhotonSettings {
+            direct_photons: true,
+            photons: 1 << 15,
+            ..settings("bounces=1..1")
+        };
+        let expected = Mean {
+            value: 0.0108397,
+            variance: 0.0,
+        };
+        means(gpu, &scene, &settings, 8).expect("airlight", 0, 0, expected, 1e-2);
+    });
+}
