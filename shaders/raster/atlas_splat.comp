@@ -44,7 +44,8 @@ void main() {
     int side = int(push.level.side);
     float half_diagonal = shadow_texel_radius(SHADOW_OCTAHEDRON, p, side);
     int reach = atlas_reach(distance, push.radius, half_diagonal);
-    float spread = max(push.radius, distance * half_diagonal);
+    float slack = atlas_slack(surfel.position, distance);
+    float middle_radius = atlas_middle_radius(distance, abs(dot(normal, p)), push.radius, half_diagonal);
     uint layer;
     ivec2 middle = min(ivec2(shadow_place(SHADOW_OCTAHEDRON, p, side, layer)), ivec2(side - 1));
     int across = 2 * reach + 1;
@@ -53,7 +54,7 @@ void main() {
         ivec2 step_to = ivec2(place % across, place / across) - reach;
         ShadowTexel texel = shadow_wrap(SHADOW_OCTAHEDRON, ShadowTexel(0u, middle + step_to), side);
         vec3 direction = shadow_direction(SHADOW_OCTAHEDRON, texel, side);
-        float found = atlas_distance(p, normal, push.radius, spread, direction, step_to == ivec2(0));
+        float found = atlas_distance(p, normal, step_to == ivec2(0) ? middle_radius : push.radius, slack, direction);
         uint bits = floatBitsToUint(found);
         if (bits < ATLAS_EMPTY) {
             atomicMin(atlas_texels[atlas_texel(push.level, push.first_map + map, texel.at)], bits);

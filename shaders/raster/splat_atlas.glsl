@@ -11,6 +11,14 @@ const uint ATLAS_EMPTY = 0x7F800000u;
 // Texels from its middle that a disc is drawn to, at most.
 const int ATLAS_REACH = 3;
 
+// Planes count as seen at so many half diagonals of a texel at least, radians: at its own angle.
+const float ATLAS_LEAST_ANGLE = 2.0;
+
+// A plane counts as one through the origin, which sees nothing of it, when it is no farther off than packed normals err over the distance of its point, and
+// positions over their coordinates.
+const float ATLAS_NORMAL_ERROR = 1.0 / 8192.0;
+const float ATLAS_POSITION_ERROR = 1.0 / 2097152.0;
+
 // Texels count as those of one surface when they are farther than the nearest by no more than this share.
 const float ATLAS_SAME_SURFACE = 0.05;
 
@@ -48,24 +56,30 @@ int atlas_reach(float distance, float radius, float half_diagonal) {
     return texels < float(ATLAS_REACH) ? int(texels) : ATLAS_REACH;
 }
 
-// How far a unit direction goes to the disc about a point, which is given from where the direction begins, in its plane; infinite where it misses. The middle
-// texel has the disc whole, however small it is: there the plane counts as far as `spread` from the point.
-float atlas_distance(vec3 p, vec3 normal, float radius, float spread, vec3 direction, bool is_middle) {
+// Radius of a disc in the texel of its middle, `height` of the origin over its plane: as large as the texel's half diagonal as the plane cuts it, up to half of
+// its distance, so that the texel's centre finds a disc however small.
+float atlas_middle_radius(float distance, float height, float radius, float half_diagonal) {
+    float cosine = max(height / distance, ATLAS_LEAST_ANGLE * half_diagonal);
+    return max(radius, distance * half_diagonal / cosine);
+}
+
+// Height over a plane up to which it counts as one through the origin.
+float atlas_slack(vec3 position, float distance) {
+    vec3 a = abs(position);
+    return ATLAS_NORMAL_ERROR * distance + ATLAS_POSITION_ERROR * max(a.x, max(a.y, a.z));
+}
+
+// How far a unit direction goes to the disc about a point, which is given from where the direction begins, in its plane; infinite where it misses, and of planes that
+// are no more than `slack` off.
+float atlas_distance(vec3 p, vec3 normal, float radius, float slack, vec3 direction) {
     float height = dot(normal, p);
-    float fall = dot(normal, direction);
-    bool is_turned = height < 0.0;
-    height = is_turned ? -height : height;
-    fall = is_turned ? -fall : fall;
+    float fall = height < 0.0 ? -dot(normal, direction) : dot(normal, direction);
     float nowhere = uintBitsToFloat(ATLAS_EMPTY);
-    if (!(fall > 0.0)) {
+    if (!(fall > 0.0 && abs(height) > slack)) {
         return nowhere;
     }
-    float along = height / fall;
+    float along = abs(height) / fall;
     vec3 beside = along * direction - p;
-    if (is_middle) {
-        float middle = length(p);
-        return clamp(along, max(middle - spread, 0.0), middle + spread);
-    }
     return dot(beside, beside) <= radius * radius ? along : nowhere;
 }
 

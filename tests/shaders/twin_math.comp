@@ -177,6 +177,7 @@ void main() {
         uvec2 lights = interleave_lights(in_bits(6u), n * n, in_bits(7u));
         out_bits(4u, lights.x);
         out_bits(5u, lights.y);
+        out_bits(6u, interleave_subset(lights.x, n * n, max(in_bits(7u), 1u)));
         break;
     }
     case 16u: {  // partial weights of paths from both ends

@@ -26,8 +26,11 @@ void main() {
         break;
     }
     case 2u: {  // discs
-        out1(0u, atlas_distance(in3(0u), in3(3u), in1(6u), 0.0, in3(7u), false));
-        out1(1u, atlas_distance(in3(0u), in3(3u), in1(6u), in1(10u), in3(7u), true));
+        float distance = length(in3(0u));
+        float slack = atlas_slack(in3(15u), distance);
+        out1(0u, atlas_distance(in3(0u), in3(3u), in1(6u), slack, in3(7u)));
+        out1(1u, atlas_middle_radius(distance, abs(dot(in3(0u), in3(3u))), in1(6u), in1(10u)));
+        out1(4u, slack);
         out_bits(2u, atlas_stratum(in_bits(11u), in_bits(12u), in_bits(13u)));
         out_bits(3u, uint(atlas_reach(in1(14u), in1(6u), in1(10u))));
         break;

@@ -219,7 +219,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "SVO-P9",
     name: "pyramids of what texels reflect, and points of low discrepancy that are warped through them",
     role: Role::PartOf("SVO-P8"),
-    limits: "Square maps whose side is a power of two; a level takes about a bit of each coordinate.",
+    limits: "Square maps whose side is a power of two; a level takes about a bit of each coordinate; where what is seen changes within a pixel, the shift that all pixels of a frame share makes as much noise as random points.",
     sources: &[
         sources::CLARBERG_2005.whole(),
         sources::HALTON_1960.whole(),
@@ -238,6 +238,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/raster/reflective.rs::even_maps_leave_points_where_they_are",
         "engine/src/raster/reflective.rs::radical_inverses_are_the_digits_in_reverse",
         "tests/tests/instant_radiosity/many_light/reflective.rs::each_light_reflects_as_much",
+        "tests/tests/instant_radiosity/many_light/reflective.rs::even_sequences_have_the_same_mean_and_less_noise",
         "tests/tests/instant_radiosity/many_light/reflective.rs::black_maps_give_no_lights",
         "tests/tests/twins/reflective.rs::reflective_maps_agree_with_their_twins",
     ],

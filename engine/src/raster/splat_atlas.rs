@@ -13,8 +13,11 @@
 //!
 //! # Bias
 //!
-//! Against maps of all triangles ([`OmniShadowMaps`](super::OmniShadowMaps)): discs hang over edges by their radius, so that silhouettes are too wide by as much; where no disc
-//! lies, surfaces behind show through; fills are as far as their neighbours. Cut-outs are opaque. Errors fall with points and texels.
+//! Against maps of all triangles ([`OmniShadowMaps`](super::OmniShadowMaps)): discs hang over edges by their radius, so that silhouettes are too wide by as much, by half a texel's
+//! diagonal at least; where no disc lies, surfaces behind show through; fills are as far as their neighbours, and spread over what sees nothing, where no receiver is either.
+//! Planes through the origin, within what packed normals tell, are left out: of a light's own surface only what lies behind it would see it. Cut-outs are opaque. In a closed
+//! room and maps of 32² texels 22, 9, 5 and 3 % of texels are off by a tenth at 128, 1,024, 4,096 and 16,384 points: errors fall by the power −0.4 of the points, until
+//! what is left is half a texel about silhouettes.
 //!
 //! Guarantees: deterministic, in whatever order invocations come; which points a place has depends on its number alone, not on how maps are parted among
 //! records. Twin: [`atlas_map`].
@@ -25,7 +28,10 @@ use super::splats::places_on;
 use super::{OmniShadowImage, ShadowLayout, Surfaces, shadow_texel_radius};
 use crate::accel::MAX_COORDINATE;
 use crate::catalogue::{Bias, Role, Row, sources};
-use crate::gpu::shaders::constants::{ATLAS_EMPTY, ATLAS_REACH, ATLAS_SAME_SURFACE, PACKED_NORMAL_BITS};
+use crate::gpu::shaders::constants::{
+    ATLAS_EMPTY, ATLAS_LEAST_ANGLE, ATLAS_NORMAL_ERROR, ATLAS_POSITION_ERROR, ATLAS_REACH, ATLAS_SAME_SURFACE,
+    PACKED_NORMAL_BITS,
+};
 use crate::gpu::shaders::raster::{atlas_pull, atlas_push, atlas_splat, atlas_surfels};
 use crate::gpu::shaders::sets::OmniShadowSet;
 use crate::gpu::shaders::types::{AtlasLevel, OrientedSurfel, SceneTriangle, SurfelPlace};
@@ -42,7 +48,7 @@ use crate::{Error, Result};
 
 /// Points that a map's each is one of: so many maps have no point in common, about.
 pub const STRATA: u32 = 16;
-/// Area of a disc over its share of all surfaces: half of them again, so that fewer places lie under none.
+/// Area of a disc over its share of all surfaces: half of them again, so that fewer places lie under none. Larger ones fill maps better, and shade what is beside small things.
 const OVERLAP: f64 = 1.5;
 
 /// What a [`SplatAtlas`] is.
@@ -360,19 +366,30 @@ pub fn atlas_reach(distance: f64, radius: f64, half_diagonal: f64) -> i32 {
     }
 }
 
-/// How far a unit `direction` goes to the disc of that radius about a point, metres; infinite where it misses. In the disc's `middle` texel the plane counts as far as
-/// that spread from the point.
-pub fn atlas_distance(p: DVec3, normal: DVec3, radius: f64, direction: DVec3, middle: Option<f64>) -> f64 {
-    let (height, fall) = (normal.dot(p), normal.dot(direction));
-    let (height, fall) = if height < 0.0 { (-height, -fall) } else { (height, fall) };
-    if fall <= 0.0 {
+/// Radius of a disc in the texel that its middle lies in, metres, for that height of the origin over its plane, metres, and half the texel's diagonal, radians.
+pub fn atlas_middle_radius(distance: f64, height: f64, radius: f64, half_diagonal: f64) -> f64 {
+    let cosine = (height / distance).max(f64::from(ATLAS_LEAST_ANGLE) * half_diagonal);
+    radius.max(distance * half_diagonal / cosine)
+}
+
+/// Height over the plane of a point, metres, up to which the plane counts as one through the origin, from which nothing of it is seen: what packed normals and positions
+/// err. Without it a light's own surface stood before the light, or behind, by chance.
+pub fn atlas_slack(position: DVec3, distance: f64) -> f64 {
+    f64::from(ATLAS_NORMAL_ERROR) * distance + f64::from(ATLAS_POSITION_ERROR) * position.abs().max_element()
+}
+
+/// How far a unit `direction` goes to the disc of that radius about a point, metres; infinite where it misses, and of planes no more than `slack` off, metres.
+pub fn atlas_distance(p: DVec3, normal: DVec3, radius: f64, slack: f64, direction: DVec3) -> f64 {
+    let height = normal.dot(p);
+    let fall = height.signum() * normal.dot(direction);
+    if fall <= 0.0 || height.abs() <= slack {
         return f64::INFINITY;
     }
-    let along = height / fall;
-    match middle {
-        Some(spread) => along.clamp((p.length() - spread).max(0.0), p.length() + spread),
-        None if (along * direction - p).length_squared() <= radius * radius => along,
-        None => f64::INFINITY,
+    let along = height.abs() / fall;
+    if (along * direction - p).length_squared() <= radius * radius {
+        along
+    } else {
+        f64::INFINITY
     }
 }
 
@@ -403,14 +420,15 @@ pub fn atlas_map(
         let normal = unpack_octahedral(surfel.normal, PACKED_NORMAL_BITS);
         let half_diagonal = shadow_texel_radius(ShadowLayout::Octahedron, p, side);
         let reach = atlas_reach(distance, radius, half_diagonal);
-        let spread = radius.max(distance * half_diagonal);
+        let slack = atlas_slack(Vec3::from_array(surfel.position).as_dvec3(), distance);
+        let middle_radius = atlas_middle_radius(distance, normal.dot(p).abs(), radius, half_diagonal);
         let place = (0.5 + 0.5 * octahedron_encode(p)) * f64::from(side);
         let middle = place.as_ivec2().min(size - 1);
         for y in -reach..=reach {
             for x in -reach..=reach {
                 let at = octahedron_wrap(middle + IVec2::new(x, y), size);
-                let is_middle = (x, y) == (0, 0);
-                let found = atlas_distance(p, normal, radius, direction(at), is_middle.then_some(spread));
+                let radius = if (x, y) == (0, 0) { middle_radius } else { radius };
+                let found = atlas_distance(p, normal, radius, slack, direction(at));
                 let texel = &mut texels[(at.y * size.x + at.x) as usize];
                 *texel = texel.min(found);
             }
@@ -480,7 +498,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "SVO-G3",
     name: "imperfect shadow maps: octahedra about many places at once, of discs about points of the surfaces, with holes filled (BG-11)",
     role: Role::PartOf("SVO-P12"),
-    limits: "Silhouettes are too wide by the radius of discs, surfaces show through where no disc lies, and cut-outs are opaque; octahedra have both sides of a light's surface.",
+    limits: "Silhouettes are too wide by the radius of discs, surfaces show through where no disc lies, and cut-outs are opaque; texels off by a tenth fall by the power −0.4 of the points, from 22 % of 32² in a room with 128 to 3 % with 16,384; octahedra have both sides of a light's surface.",
     sources: &[
         sources::RITSCHEL_2008.whole(),
         sources::BOTSCH_2005.whole(),
@@ -501,7 +519,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/raster/splat_atlas.rs::holes_take_what_is_of_their_surface",
         "engine/src/raster/splat_atlas.rs::points_are_stratified_by_area_and_differ_from_map_to_map",
         "tests/tests/raster/splat_atlas.rs::imperfect_maps_are_those_of_the_twin",
+        "engine/src/raster/splat_atlas.rs::discs_are_met_in_their_plane",
         "tests/tests/raster/splat_atlas.rs::imperfect_maps_come_to_exact_ones_with_more_points",
+        "tests/tests/raster/splat_atlas.rs::surfaces_do_not_stand_before_lights_on_them",
         "tests/tests/raster/splat_atlas.rs::maps_do_not_depend_on_how_they_are_parted",
         "tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays",
     ],
@@ -589,14 +609,22 @@ mod tests {
         let (p, slanted) = (DVec3::new(0.1, 0.0, 2.0), DVec3::new(0.6, 0.0, 0.8));
         let height = slanted.dot(p);
         for normal in [slanted, -slanted] {
-            let found = atlas_distance(p, normal, 0.2, DVec3::Z, None);
+            let found = atlas_distance(p, normal, 0.2, 0.01, DVec3::Z);
             assert!((found - height / 0.8).abs() < 1e-12);
             // 0.1 along x is 0.125 along the plane.
-            assert_eq!(atlas_distance(p, normal, 0.12, DVec3::Z, None), f64::INFINITY);
-            assert_eq!(atlas_distance(p, normal, 0.2, -DVec3::Z, None), f64::INFINITY);
-            // The middle has it, however small: as far as the spread.
-            assert_eq!(atlas_distance(p, normal, 0.0, DVec3::Z, Some(0.01)), p.length() + 0.01);
+            assert_eq!(atlas_distance(p, normal, 0.12, 0.01, DVec3::Z), f64::INFINITY);
+            assert_eq!(atlas_distance(p, normal, 0.2, 0.01, -DVec3::Z), f64::INFINITY);
+            // A plane that is no farther off than errors stands before nothing.
+            assert_eq!(atlas_distance(p, normal, 9.0, height, DVec3::Z), f64::INFINITY);
         }
+        // In the texel of its middle a small disc is half a diagonal wide, more where its plane is slanted, up to half of its distance.
+        for (height, radius) in [(2.0, 0.2), (1.0, 0.4), (0.0, 1.0)] {
+            assert!(
+                (atlas_middle_radius(2.0, height, 0.001, 0.1) - radius).abs() < 1e-9,
+                "{height}"
+            );
+        }
+        assert_eq!(atlas_middle_radius(2.0, 2.0, 0.3, 0.1), 0.3);
         assert_eq!(
             [0.001, 0.12, 5.0].map(|radius| atlas_reach(1.0, radius, 0.1)),
             [1, 1, ATLAS_REACH]

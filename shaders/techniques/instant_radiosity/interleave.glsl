@@ -40,4 +40,7 @@ uvec2 interleave_lights(uint subset, uint subsets, uint lights) {
     return uvec2(first, min(max((subset + 1u) * lights / subsets, first + 1u), lights));
 }
 
+// The last subset that has a light.
+uint interleave_subset(uint light, uint subsets, uint lights) { return ((light + 1u) * subsets - 1u) / lights; }
+
 #endif

@@ -10,9 +10,9 @@ const uint RSM_SPOT = 1u;     // within a cone
 const uint RSM_DISTANT = 2u;  // parallel light
 const uint RSM_SURFACE = 3u;  // a point of a surface that emits by Lambert's law
 
-// How the points of a frame's lights lie in the unit cube.
-const uint RSM_HALTON = 0u;      // bases 2, 3 and 5
-const uint RSM_HAMMERSLEY = 1u;  // the number over all, bases 2 and 3
+// How the points of a frame's lights lie in the unit square.
+const uint RSM_HALTON = 0u;      // bases 2 and 3
+const uint RSM_HAMMERSLEY = 1u;  // the number over those of its subset, and base 2
 const uint RSM_RANDOM = 2u;      // independent
 
 // A light, or a primary virtual light in place of one that has an area or surrounds the scene.

@@ -1,6 +1,7 @@
 #version 460
-// Virtual lights from reflective shadow maps: points of a low-discrepancy sequence, shifted as a whole each frame, come to views and texels in proportion to the
-// luminance that those reflect, by the pyramids of their sums. Each light has as much of it.
+// Virtual lights from reflective shadow maps: points of a low-discrepancy sequence in the unit square, shifted as a whole each frame, come to views and texels in
+// proportion to the luminance that those reflect: views lie side by side along the first coordinate, whose place in the share of its view goes on through the pyramid of
+// that view's sums. Each light has as much of it.
 //
 // SVO-P9: P. Clarberg, W. Jarosz, T. Akenine-Moeller and H. W. Jensen, "Wavelet Importance Sampling", 2005 (hierarchical warping). Deterministic in (seed, frame, light).
 #extension GL_GOOGLE_include_directive : require
@@ -15,6 +16,7 @@ layout(constant_id = 40) const uint RSM_SEQUENCE = 0u;  // RSM_HALTON, RSM_HAMME
 #include "invocation.glsl"
 #include "raster/atlas_level.glsl"
 #include "raster/reflective.glsl"
+#include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/new_virtual_light.glsl"
 #include "techniques/instant_radiosity/rsm.glsl"
 #include "transport/random.glsl"
@@ -29,6 +31,7 @@ layout(push_constant, scalar) uniform Push {
     uint side;
     uint frame;
     uint seed;
+    uint subsets;    // of the lights, that pixels gather by themselves
 } push;
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer RsmEmitters { RsmEmitter rsm_emitters[]; };
@@ -38,33 +41,46 @@ layout(set = 0, binding = 3, scalar) restrict readonly buffer RsmViews { RsmView
 layout(set = 0, binding = 4, scalar) restrict writeonly buffer VirtualLightRecords { uvec4 virtual_light_records[]; };
 layout(set = 0, binding = 5, scalar) restrict writeonly buffer RsmTotal { float rsm_total; };  // luminance that all views reflect, W
 
-vec3 unit_floats(uvec3 words) { return vec3(unit_float(words.x), unit_float(words.y), unit_float(words.z)); }
+vec2 unit_floats(uvec2 words) { return vec2(unit_float(words.x), unit_float(words.y)); }
 
-// Of a light in the unit cube.
-vec3 sequence_point(uint number) {
+// Of a light in the unit square.
+vec2 sequence_point(uint number) {
     if (RSM_SEQUENCE == RSM_RANDOM) {
-        return unit_floats(pcg4d(uvec4(number, push.frame, SEQUENCE_KEY, push.seed)).xyz);
+        return unit_floats(pcg4d(uvec4(number, push.frame, SEQUENCE_KEY, push.seed)).xy);
     }
-    bool is_halton = RSM_SEQUENCE == RSM_HALTON;
-    vec3 point = vec3(rsm_radical_inverse(number, 2u), rsm_radical_inverse(number, 3u),
-                      is_halton ? rsm_radical_inverse(number, 5u) : (float(number) + 0.5) / float(push.lights));
-    vec3 shift = unit_floats(pcg4d(uvec4(JOINT_KEY, push.frame, SEQUENCE_KEY, push.seed)).xyz);
-    return min(fract(point + shift), vec3(RSM_BELOW_ONE));
+    vec2 point;
+    uint subset = 0u;
+    if (RSM_SEQUENCE == RSM_HALTON) {
+        // Consecutive points are spread evenly, so that those of a subset are.
+        point = vec2(rsm_radical_inverse(number, 2u), rsm_radical_inverse(number, 3u));
+    } else {
+        // Consecutive points lie in a stripe: each subset has a set of its own.
+        subset = interleave_subset(number, push.subsets, push.lights);
+        uvec2 lights = interleave_lights(subset, push.subsets, push.lights);
+        uint within = number - lights.x;
+        point = vec2((float(within) + 0.5) / float(lights.y - lights.x), rsm_radical_inverse(within, 2u));
+    }
+    vec2 shift = unit_floats(pcg4d(uvec4(JOINT_KEY + subset, push.frame, SEQUENCE_KEY, push.seed)).xy);
+    return min(fract(point + shift), vec2(RSM_BELOW_ONE));
 }
 
-// The view in whose share of all luminance a number lies: never one without any.
-uint choose_view(float number, float total) {
+// The view in whose share of all luminance a number lies, never one without any; the number becomes its place within that share.
+uint choose_view(inout float number, float total) {
     float left = number * total;
+    float within = 0.0;
     uint chosen = 0u;
     uint view = 0u;
     bool found = false;
     do {
         float share = flux_sums[push.top.first + view];
-        chosen = !found && share > 0.0 ? view : chosen;
-        found = found || (share > 0.0 && left < share);
+        bool may_be = !found && share > 0.0;
+        chosen = may_be ? view : chosen;
+        within = may_be ? left / share : within;
+        found = found || (may_be && left < share);
         left -= share;
         ++view;
     } while (view < push.views);
+    number = clamp(within, 0.0, RSM_BELOW_ONE);
     return chosen;
 }
 
@@ -85,8 +101,8 @@ void main() {
     if (!(total > 0.0)) {
         return;
     }
-    vec3 point = sequence_point(number);
-    uint view = choose_view(point.z, total);
+    vec2 point = sequence_point(number);
+    uint view = choose_view(point.x, total);
     AtlasLevel level = push.top;
     ivec2 at = ivec2(0);
     while (level.side < push.side) {
@@ -96,7 +112,7 @@ void main() {
         for (int child = 0; child < 4; ++child) {
             children[child] = flux_sums[atlas_texel(level, view, 2 * at + ivec2(child & 1, child >> 1))];
         }
-        at = 2 * at + rsm_warp(children, point.xy);
+        at = 2 * at + rsm_warp(children, point);
     }
     uint place = atlas_texel(level, view, at);
     RsmTexel texel = rsm_texels[place];

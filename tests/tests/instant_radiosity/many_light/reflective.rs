@@ -139,25 +139,41 @@ fn frames_of_reflective_maps_are_the_path_tracers() {
     });
 }
 
-/// Sequences change the noise alone, and even ones make less of it.
+/// Sequences change the noise alone, and even ones make far less of it, in whole frames and in the part of the lights that a tile has. Of a centimetre of the
+/// slab: all pixels of a frame share one shift, and where what is seen changes within a pixel that would hide what lights do.
 #[test]
-fn sequences_have_the_same_mean() {
+fn even_sequences_have_the_same_mean_and_less_noise() {
     with_gpu(|gpu| {
-        let scene = hall();
-        let of_sequence = |rsm_sequence| {
+        let mut scene = hall();
+        // A spot of the slab's top.
+        scene.cameras = vec![orthographic(DVec3::Y * 1.9, DVec3::ZERO, -DVec3::Z, 0.005)];
+        // Means, the deviation of frames' means, and that of pixels.
+        let of_sequence = |interleave, size: [u32; 2], rsm_sequence| {
             let settings = ManyLightSettings {
                 rsm_sequence,
                 lights: 256,
-                interleave: 1,
+                interleave,
                 ..of(INDIRECT, rsm())
             };
-            let mut renderer = frames(gpu, &scene, SIZE, &settings);
-            mean(&passes_of(&mut renderer, SIZE, 1, 24).radiance, 0)
+            let count = 64;
+            let passes = passes_of(&mut frames(gpu, &scene, size, &settings), size, 1, count);
+            let (n, means) = (f64::from(count), &passes.means[0]);
+            let average = means.iter().sum::<f64>() / n;
+            let squares: f64 = means.iter().map(|mean| (mean - average).powi(2)).sum();
+            let pixels = n * mean(&passes.variance, 0);
+            [average, (squares / (n - 1.0)).sqrt(), pixels.sqrt()]
         };
-        let [random, halton, hammersley] =
-            [RsmSequence::Random, RsmSequence::Halton, RsmSequence::Hammersley].map(of_sequence);
-        println!("means {random} {halton} {hammersley}");
-        assert!((halton / random - 1.0).abs() < 0.02 && (hammersley / random - 1.0).abs() < 0.02);
+        const SEQUENCES: [RsmSequence; 3] = [RsmSequence::Random, RsmSequence::Halton, RsmSequence::Hammersley];
+        // All lights at all pixels, and a sixteenth of them, 16, by tiles.
+        for (interleave, size, most) in [(1, [2, 2], [0.25, 0.25]), (4, [8, 8], [0.6, 0.6])] {
+            let [random, even @ ..] = SEQUENCES.map(|sequence| of_sequence(interleave, size, sequence));
+            println!("{interleave}: {random:?} {even:?}");
+            for ([mean, frames, pixels], most) in even.into_iter().zip(most) {
+                assert!((mean / random[0] - 1.0).abs() < 0.03, "{interleave}: {mean} {random:?}");
+                assert!(pixels < most * random[2], "{interleave}: {pixels} {random:?}");
+                assert!(interleave > 1 || frames < most * random[1], "{frames} {random:?}");
+            }
+        }
     });
 }
 

@@ -61,6 +61,11 @@ impl Interleaving {
         let first = subset * lights / subsets;
         first..((subset + 1) * lights / subsets).max(first + 1).min(lights)
     }
+
+    /// The last part that has a light, of one or more.
+    pub fn subset(light: u32, subsets: u32, lights: u32) -> u32 {
+        ((light + 1) * subsets - 1) / lights
+    }
 }
 
 #[cfg(test)]
@@ -122,6 +127,9 @@ mod tests {
                 assert_eq!(part.start, end, "{lights} {subset}");
                 assert!(part.len() as u32 >= lights / subsets && part.len() as u32 <= lights.div_ceil(subsets));
                 end = part.end;
+                for light in part {
+                    assert_eq!(Interleaving::subset(light, subsets, lights), subset, "{lights} {light}");
+                }
             }
             assert_eq!(end, lights);
         }

@@ -61,6 +61,8 @@ pub(super) struct Reflective {
     side: u32,
     emitter_count: u32,
     lights: u32,
+    /// Of the lights, that pixels gather by themselves.
+    subsets: u32,
     seed: u32,
 }
 
@@ -142,6 +144,7 @@ impl Reflective {
             side,
             emitter_count,
             lights: settings.lights,
+            subsets: settings.subsets(),
             seed: settings.seed,
         })
     }
@@ -309,6 +312,7 @@ impl Reflective {
                 side: self.side,
                 frame,
                 seed: self.seed ^ LIGHT_SEED,
+                subsets: self.subsets,
             };
             let set = rsm_lights::Set0 {
                 rsm_emitters: self.emitters.view(),

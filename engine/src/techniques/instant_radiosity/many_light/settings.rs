@@ -49,10 +49,10 @@ pub enum Placement {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RsmSequence {
-    /// Of the bases 2, 3 and 5.
+    /// Of the bases 2 and 3.
     #[default]
     Halton,
-    /// Their number over all, and the bases 2 and 3.
+    /// Their number over all of their tile, and the base 2: a set for each tile, with a shift of its own.
     Hammersley,
     /// Independent ones.
     Random,
