@@ -241,7 +241,7 @@ impl Study for Found {
         let (side, sizes) = (context.pick(110, 12), context.pick([110, 192], [12, 32]));
         let mut coarser = None;
         let curved = context.each(
-            context.first(&CELLS, 2),
+            &CELLS,
             |cells| format!("{} triangles", triangles(*cells)),
             |cells| Ok(vec![curved(*cells, side, &mut coarser)]),
         )?;
