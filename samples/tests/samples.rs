@@ -54,6 +54,12 @@ fn assert_cornell_box(picture: &image::RgbImage) {
     assert!(back[0] > 30.0 && back[0] < 2.0 * back[1], "back wall {back:?}");
 }
 
+/// Its walls alone, whatever lights them.
+fn assert_cornell_walls(picture: &image::RgbImage) {
+    let [red, green] = [[0.04, 0.14], [0.86, 0.96]].map(|across| mean(picture, across, [0.3, 0.7]));
+    assert!(red[0] > 1.5 * red[1] && green[1] > 1.2 * green[0], "{red:?} {green:?}");
+}
+
 /// Runs a sample under the validation layers; fails when it does.
 fn run(program: &str, arguments: &[&str]) -> Output {
     let output = Command::new(program)
@@ -683,8 +689,7 @@ fn the_reflection_preview_has_a_window_and_takes_any_scene() {
     assert!(output.status.success(), "{}", said(&output));
     let picture = open(&path);
     assert_eq!(picture.dimensions(), (64, 64));
-    let [red, green] = [[0.04, 0.14], [0.86, 0.96]].map(|across| mean(&picture, across, [0.3, 0.7]));
-    assert!(red[0] > 1.5 * red[1] && green[1] > 1.2 * green[0], "{red:?} {green:?}");
+    assert_cornell_walls(&picture);
 }
 
 #[test]
@@ -738,6 +743,50 @@ fn the_mirror_room_comes_nearer_to_rays_with_distances() {
     assert!(step < 0.7 * alone && search < 0.7 * alone, "{text}");
     let picture = open(&path);
     assert_eq!(picture.dimensions(), (128, 32));
+}
+
+/// The window goes through the methods by keys, and shows differences and residuals of each.
+#[test]
+fn the_mirror_room_has_a_window_and_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mirror.png");
+    let shown = |method: &str, keys: &str| {
+        let scene = ["--scene", "builtin:cornell-box?source=point&sphere=mirror"];
+        let small = [
+            "--size", "40x40", "--frames", "6", "--map", "128", "--show", method, "--keys", keys,
+        ];
+        let output = windowed(env!("CARGO_BIN_EXE_mirror_room"), &[&scene[..], &small].concat(), &path);
+        assert!(output.status.success(), "{}", said(&output));
+        let whole = mean(&open(&path), [0.0, 1.0], [0.0, 1.0]).iter().sum::<f32>();
+        (whole, said(&output), open(&path))
+    };
+    let (_, text, hybrid) = shown("hybrid", "p");
+    assert!(text.contains("hybrid, "), "{text}");
+    assert_cornell_walls(&hybrid);
+    // From the last around to the first, and back again.
+    for (method, keys, expected) in [("march", "M", "classical, "), ("classical", "nn", "hybrid, ")] {
+        let (_, text, _) = shown(method, keys);
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    // The search differs less from rays than the map alone, and its residual is seen on the sphere alone.
+    let [(alone, ..), (search, ..)] = ["classical", "hybrid"].map(|method| shown(method, "d"));
+    assert!(alone > 1.2 * search && search > 0.0, "{alone} {search}");
+    let (_, _, residual) = shown("hybrid", "e");
+    assert_eq!(residual.get_pixel(1, 1).0, [0; 3]);
+    let colored = residual.pixels().filter(|pixel| pixel.0 != [0; 3]).count();
+    assert!((20..800).contains(&colored), "{colored}");
+}
+
+#[test]
+fn the_mirror_room_names_the_methods_that_there_are() {
+    let output = Command::new(env!("CARGO_BIN_EXE_mirror_room"))
+        .args(["--show", "spiral"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    for word in ["--show: spiral", "classical", "one_step", "false_position", "march"] {
+        assert!(said(&output).contains(word), "{word}: {}", said(&output));
+    }
 }
 
 /// Schlick's curve without k loses the metals' colours, the compensated one is about as near as the exact factor, and three channels are not bins of wavelengths.

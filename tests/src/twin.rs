@@ -7,7 +7,7 @@
 use crate::shaders::types::{RandomCase, RandomWords};
 use crate::shaders::{constants, twin_random};
 use bytemuck::{Pod, Zeroable};
-use clerestory::gpu::interface::{ComputeShader, SpecConstants};
+use clerestory::gpu::interface::ComputeShader;
 use clerestory::gpu::{BufferDesc, Category, ComputePipeline, DeviceKind, Gpu};
 use clerestory::transport::random::SamplerKind;
 
@@ -119,8 +119,9 @@ pub fn compare(
 }
 
 /// Dispatches one invocation per case of a kernel with the three buffers cases, results, table.
-pub fn dispatch<K: ComputeShader<Spec = ()>>(
+pub fn dispatch<K: ComputeShader>(
     gpu: &Gpu,
+    spec: &K::Spec,
     cases: &[Case],
     table: &[f32],
     record: impl FnOnce(
@@ -128,12 +129,9 @@ pub fn dispatch<K: ComputeShader<Spec = ()>>(
         &ComputePipeline<K>,
         [clerestory::gpu::BufferView<'_>; 3],
     ) -> clerestory::Result<()>,
-) -> Vec<Results>
-where
-    (): SpecConstants,
-{
+) -> Vec<Results> {
     let run = || -> clerestory::Result<Vec<Results>> {
-        let pipeline = gpu.compute_pipeline::<K>(&())?;
+        let pipeline = gpu.compute_pipeline::<K>(spec)?;
         let input = gpu.buffer_with("cases", Category::Work, cases)?;
         let bytes = size_of_val(cases) as u64 / 2;
         let output = gpu.buffer(&BufferDesc::storage("results", bytes, Category::Work))?;
@@ -192,15 +190,21 @@ macro_rules! twin_kernel {
         ) -> Vec<$crate::twin::Results> {
             use $crate::shaders::$name as shader;
             let case_count = cases.len() as u32;
-            $crate::twin::dispatch::<shader::Kernel>(gpu, cases, table, |pass, pipeline, [inputs, outputs, table]| {
-                let set = shader::Set0 {
-                    twin_inputs: inputs,
-                    twin_outputs: outputs,
-                    twin_table: table,
-                };
-                let push = shader::Push { function, case_count };
-                pass.dispatch(pipeline, &[&set], &push, [pipeline.groups_for(case_count), 1, 1])
-            })
+            $crate::twin::dispatch::<shader::Kernel>(
+                gpu,
+                &(),
+                cases,
+                table,
+                |pass, pipeline, [inputs, outputs, table]| {
+                    let set = shader::Set0 {
+                        twin_inputs: inputs,
+                        twin_outputs: outputs,
+                        twin_table: table,
+                    };
+                    let push = shader::Push { function, case_count };
+                    pass.dispatch(pipeline, &[&set], &push, [pipeline.groups_for(case_count), 1, 1])
+                },
+            )
         }
     };
 }

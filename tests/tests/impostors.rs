@@ -92,6 +92,31 @@ fn convex_rooms_give_the_published_errors() {
     });
 }
 
+/// The first interface of a glass sphere, by the index of glass.
+#[test]
+fn refracted_rays_are_found_as_published() {
+    use SearchMethod::{Classical, FalsePosition, SecantFromGuess};
+    with_gpu(|gpu| {
+        let sphere = ShinySphere::B;
+        let rays = sphere.rays(SIDE, Some(1.5));
+        for map in MAPS {
+            let (image, impostor) = room(gpu, map, sphere.room, 1);
+            for (method, steps, published) in [
+                (Classical, 0, 17.28),
+                (SecantFromGuess, 0, 0.073),
+                (FalsePosition, 3, 0.004),
+            ] {
+                let settings = ImpostorSettings::of(method, steps);
+                let hits = impostor.search(&rays, &settings).unwrap();
+                let what = format!("{map} glass {method} +{steps}");
+                near(&what, mean(&errors(&sphere, &rays, &hits)), published);
+                let off = share_that_differs(&image, &rays, &hits, &settings);
+                assert!(off < 0.01, "{what}: {off}");
+            }
+        }
+    });
+}
+
 #[test]
 fn hidden_points_need_the_hybrid() {
     use SearchMethod::{FalsePosition, Hybrid};

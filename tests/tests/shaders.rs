@@ -51,6 +51,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("twin_light_tree.comp", "InvalidType"),
     // Comparisons of specialization constants.
     ("twin_random.comp", "SpecConstantOp"),
+    ("twin_search.comp", "SpecConstantOp"),
     ("raster/omni_shadow_look_up.comp", "SpecConstantOp"),
     ("maps/gather.comp", "SpecConstantOp"),
     ("maps/impostor_layouts.comp", "SpecConstantOp"),

@@ -127,7 +127,7 @@ impl Tested {
     fn run(&self, gpu: &Gpu, function: u32, cases: &[Case]) -> Vec<Results> {
         let scene = upload(gpu, &self.scene);
         let case_count = cases.len() as u32;
-        dispatch::<shader::Kernel>(gpu, cases, &[], |pass, pipeline, [inputs, outputs, table]| {
+        dispatch::<shader::Kernel>(gpu, &(), cases, &[], |pass, pipeline, [inputs, outputs, table]| {
             let set = shader::Set0 {
                 twin_inputs: inputs,
                 twin_outputs: outputs,

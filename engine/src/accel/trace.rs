@@ -21,8 +21,8 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::accel::trace_queue::{self, TraceQueue, TraceStatus};
 use crate::gpu::shaders::accel::{trace_queue_vote, trace_rays};
 use crate::gpu::{
-    AccelerationStructure, Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Recorder, TexelView, Timings,
-    wide_counter,
+    AccelerationStructure, Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, Recorder,
+    TexelView, Timings, wide_counter,
 };
 use crate::{Error, Result};
 
@@ -236,6 +236,15 @@ impl RayTracer {
         TraceSettings {
             execution,
             ..self.settings
+        }
+    }
+
+    /// The kernel with its specialization.
+    pub fn pipeline(&self) -> PipelineInfo {
+        match &self.kernel {
+            Kernel::RayPerThread(pipeline) => pipeline.info(),
+            Kernel::Queue(_, QueueKernel::Plain(pipeline)) => pipeline.info(),
+            Kernel::Queue(_, QueueKernel::Vote(pipeline)) => pipeline.info(),
         }
     }
 

@@ -57,6 +57,7 @@ pub mod taps;
 pub mod to_lat_long;
 pub mod topology;
 pub mod turn;
+pub mod wavelets;
 
 #[cfg(test)]
 mod tests;

@@ -15,6 +15,8 @@
 //! paraboloids guarantee nothing of this: they are here to be compared.
 
 pub mod coverage;
+pub mod curved_mirror;
+pub mod facet;
 mod gbuffer;
 pub(crate) mod octahedron;
 pub mod octants;

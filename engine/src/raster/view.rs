@@ -217,17 +217,35 @@ impl View {
         let place = [r.scale_x * x + r.offset_x, r.scale_y * y + r.offset_y];
         let across = place[0] * vector(r.right) + place[1] * vector(r.down);
         let (origin, forward) = (vector(r.origin), vector(r.forward));
-        let (origin, direction, t_min) = if r.parallel != 0 {
-            (origin + across, forward, 0.0)
+        let (start, direction, t_min) = if r.parallel != 0 {
+            (across, forward, 0.0)
         } else {
-            (origin, forward + across, r.z[3])
+            (Vec3::ZERO, forward + across, r.z[3])
         };
+        let t_min = self.cut(start, direction).unwrap_or(t_min);
+        let origin = origin + start;
         Ray {
             origin: origin.to_array(),
             t_min,
             direction: direction.to_array(),
             t_max: f32::INFINITY,
         }
+    }
+
+    /// Where a ray from beside the origin meets the plane that cuts the view, where there is one: there depth is 1. Infinite for rays that go away from it.
+    fn cut(&self, start: Vec3, direction: Vec3) -> Option<f32> {
+        let r = &self.record;
+        let is_cut = match r.parallel {
+            0 => r.z[..3] != [0.0; 3],
+            _ => r.z[3] != r.w[3],
+        };
+        // Above 0 before the plane.
+        let row: [f32; 4] = std::array::from_fn(|i| r.w[i] - r.z[i]);
+        let normal = Vec3::from_slice(&row);
+        let along = normal.dot(direction);
+        let behind = -(normal.dot(start) + row[3]);
+        let meets = || if along > 0.0 { behind / along } else { f32::INFINITY };
+        is_cut.then(meets)
     }
 
     /// Where rays begin, metres; of parallel views, the middle of where they do.
@@ -284,7 +302,15 @@ mod tests {
         parallel.record.parallel = 1;
         for view in [central, parallel] {
             let cut = view.cut_by(REACH, normal, height);
-            // A ray begins at the near plane, which is the cutting one now.
+            // Rays go the same ways, and begin at the near plane, which is the cutting one now.
+            for (x, y) in [(10.5, 20.5), (40.0, 3.0), (60.5, 44.5)] {
+                let ray = cut.ray(x, y);
+                let from = Vec3::from_array(ray.origin) + ray.t_min * Vec3::from_array(ray.direction);
+                let off = normal.dot(from - origin) - (height + REACH * NEAR);
+                assert!(ray.t_min > 0.0 && off.abs() < 1e-3, "{x} {y}: {off}");
+                let [.., z, w] = cut.project(from.as_dvec3());
+                assert!((z / w - 1.0).abs() < 1e-3, "{z} {w}");
+            }
             let way = |view: &View| {
                 let ray = view.ray(10.5, 20.5);
                 (ray.origin, ray.direction)

@@ -1,7 +1,7 @@
 #version 460
 // Radiance that smooth surfaces mirror where eye paths first arrive, by a map of radiance and distance: one place an invocation. The surface's own mirrored
 // direction and weight are the path tracer's; what the reflected ray meets is searched for in the map's distances, or taken to lie in the ray's own direction or
-// on the box about the scene.
+// on the box about the scene. Where that is asked for, the refracted ray is followed likewise.
 //
 // Sources, bias and guarantees: techniques/impostors/mod.rs.
 #extension GL_GOOGLE_include_directive : require
@@ -17,6 +17,7 @@ layout(local_size_x = 64) in;
 
 layout(constant_id = 150) const bool REFLECTS_IN_BOX = false;  // the box about the scene stands for distances
 layout(constant_id = 151) const bool KEEPS_LOOK_UPS = false;
+layout(constant_id = 152) const bool REFRACTS = false;  // rays that are refracted are followed, too
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -82,20 +83,10 @@ ImpostorHit reflected_hit(vec3 x, vec3 r) {
     return impostor_search(x, r, extent, push.tolerance);
 }
 
-void reflect_at(uint slot, uint place) {
-    WalkState path = load_walk(slot);
-    Hit hit = load_hit(place);
-    uint bounce = HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce;
-    if (bounce != 0u || hit.triangle == NO_HIT || hit.triangle < push.first_triangle || hit.triangle >= push.end_triangle) {
-        return;
-    }
-    Arrival a = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
-    if (arrival_is_unlit(a) || !bsdf_is_delta(a.bsdf)) {
-        return;
-    }
-    ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
+// Adds what lies along the ray of a lobe, where it has one.
+void follow(uint slot, WalkState path, Arrival a, ScatteringFrame frame, uint lobe) {
     // One lobe alone: no number chooses.
-    BsdfSample mirror = bsdf_sample(a.bsdf, frame.wo, vec3(0.5), LOBE_SPECULAR & LOBE_REFLECTION);
+    BsdfSample mirror = bsdf_sample(a.bsdf, frame.wo, vec3(0.5), lobe);
     vec3 r = normalize(frame_to_world(frame, mirror.wi));
     if (mirror.flags == 0u || !sides_agree(frame.z, frame.outward, r)) {
         return;
@@ -118,6 +109,24 @@ void reflect_at(uint slot, uint place) {
     }
 }
 
+void reflect_at(uint slot, uint place) {
+    WalkState path = load_walk(slot);
+    Hit hit = load_hit(place);
+    uint bounce = HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce;
+    if (bounce != 0u || hit.triangle == NO_HIT || hit.triangle < push.first_triangle || hit.triangle >= push.end_triangle) {
+        return;
+    }
+    Arrival a = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
+    if (arrival_is_unlit(a) || !bsdf_is_delta(a.bsdf)) {
+        return;
+    }
+    ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
+    follow(slot, path, a, frame, LOBE_SPECULAR & LOBE_REFLECTION);
+    if (REFRACTS) {
+        follow(slot, path, a, frame, LOBE_SPECULAR & LOBE_TRANSMISSION);
+    }
+}
+
 void main() {
     uint place = gl_GlobalInvocationID.x;
     if (status.stalled == STALLED_EXTEND || status.stalled == STALLED_SHADOW || place >= status.active_count) {
@@ -133,5 +142,6 @@ void main() {
     walk_resume[place] = REFLECTION_DONE;
     reflect_at(load_slot(place), place);
     bool marches = IMPOSTOR_METHOD == IMPOSTOR_MARCH;
-    count_work(REFLECTION_ITERATIONS + IMPOSTOR_LAYERS * (IMPOSTOR_STEPS + (marches ? IMPOSTOR_BISECTIONS : 0u)), WORK_UNIT);
+    uint searches = REFRACTS ? 2u : 1u;
+    count_work(REFLECTION_ITERATIONS + searches * IMPOSTOR_LAYERS * (IMPOSTOR_STEPS + (marches ? IMPOSTOR_BISECTIONS : 0u)), WORK_UNIT);
 }

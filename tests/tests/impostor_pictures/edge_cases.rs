@@ -243,6 +243,26 @@ fn maps_tell_what_they_took() {
             assert!(has_shadows(&drawn), "{technique}");
             assert!(technique != "impostor" || !has_shadows(&traced));
 
+            if technique == "impostor" {
+                // Rays of further layers are counted and named: those of all paths double with the samples, and one leaves each texel of the first layer.
+                let layered = |layers: u32, samples: u32| {
+                    of(
+                        json!({"capture": "rays", "method": "march", "steps": 8, "layers": layers, "capture_samples": samples}),
+                    )
+                };
+                let beside_paths = |layers: u32| {
+                    let [once, twice] = [1, 2].map(|samples| layered(layers, samples).report.counters["map_rays"]);
+                    2 * once - twice
+                };
+                assert_eq!([1, 2].map(beside_paths), [0, 32 * 32]);
+                let traces = |layers: u32| {
+                    names(&layered(layers, 1))
+                        .iter()
+                        .any(|name| name.contains("trace_rays"))
+                };
+                assert!(!traces(1) && traces(2));
+            }
+
             // Five of a GiB each are beyond what 32 bits count.
             let mut lit = scene.clone();
             (0..4).for_each(|_| lamp(&mut lit, 1.0));

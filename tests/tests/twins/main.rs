@@ -19,6 +19,7 @@ mod raster;
 mod reflection;
 mod reflective;
 mod scattering;
+mod searches;
 mod shadows;
 mod sums;
 mod tables;

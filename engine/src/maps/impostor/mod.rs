@@ -10,6 +10,7 @@
 //! - [`ImpostorImage`]: distances and normals on the host, [`Impostor`] on the device;
 //! - [`ImpostorSettings`]: the method and its steps; [`ImpostorImage::search`] and [`Impostor::search`]: what rays meet, one by one and in batches;
 //! - [`proxy`]: spheres, boxes and a hemisphere in place of distances; [`places`]: which maps serve a point;
+//! - [`views`]: several maps together, blended by what each of them sees;
 //! - [`room`]: rooms with exact answers, which searches are measured by; [`layouts`]: what the layout of texels is measured by.
 //!
 //! Guarantees: deterministic, each ray by itself; every number in a result is finite, for rays of any numbers: one whose direction is no unit vector, or that
@@ -25,6 +26,7 @@ pub mod layouts;
 pub mod places;
 pub mod proxy;
 pub mod room;
+pub mod views;
 
 mod device;
 mod image;
@@ -35,7 +37,7 @@ mod tests;
 
 pub use device::{Impostor, ImpostorSearch};
 pub use image::{ImpostorImage, ImpostorSurface, impostor_plane};
-pub use search::{ImpostorScene, impostor_search, impostor_step};
+pub use search::{ImpostorScene, impostor_by_march, impostor_by_steps, impostor_ratio, impostor_search, impostor_step};
 pub use settings::{ImpostorSettings, MAX_BISECTIONS, MAX_STEPS, SearchMethod};
 
 use glam::DVec3;
@@ -151,6 +153,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
             "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
+            "tests/tests/twins/searches.rs::parts_of_searches_agree_with_their_twins",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -166,6 +169,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
             "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
+            "tests/tests/twins/searches.rs::searches_agree_with_their_twins",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -213,10 +217,16 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("MET-D1"),
         limits: "One interface; a ray ends on what lies beyond the body as if it had no other side.",
         sources: &[sources::SZIRMAY_KALOS_2005.whole()],
-        shaders: &["shaders/maps/proxy.glsl"],
+        shaders: &[
+            "shaders/maps/proxy.glsl",
+            "shaders/maps/impostor.glsl",
+            "shaders/techniques/impostors/impostor_reflect.comp",
+        ],
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::refracted_rays_are_found_as_published",
+            "tests/tests/impostors.rs::refracted_rays_are_found_as_published",
+            "tests/tests/impostor_pictures/reflections.rs::glass_shows_what_the_path_tracer_shows_behind_one_interface",
             "engine/src/maps/impostor/tests/proxies.rs::all_light_is_reflected_where_none_is_refracted",
             "tests/tests/twins/impostors.rs::directions_agree_with_their_twins",
         ],

@@ -72,12 +72,16 @@ impl BoxRoom {
 
     /// Distance to the first surface that a ray meets from a point in the room; the direction is a unit vector.
     pub fn hit(&self, x: DVec3, r: DVec3) -> f64 {
+        self.surface_from(x, r).distance
+    }
+
+    /// The first surface that a ray meets from a point in the room, nowhere on a surface; the direction is a unit vector.
+    pub fn surface_from(&self, x: DVec3, r: DVec3) -> ImpostorSurface {
         let of_box = self.obstacle.and_then(|obstacle| slab(x, r, obstacle));
-        let of_box = of_box.map_or(f64::INFINITY, |[enter, _]| enter.0);
-        if of_box > 0.0 && of_box < f64::INFINITY {
-            return of_box;
-        }
-        slab(x, r, WALLS).map_or(f64::INFINITY, |[_, leave]| leave.0)
+        let enters = of_box.map(|[enter, _]| enter).filter(|enter| enter.0 > 0.0);
+        let wall = || slab(x, r, WALLS).map(|[_, (distance, normal)]| (distance, -normal));
+        let (distance, normal) = enters.or_else(wall).unwrap_or((f64::INFINITY, -r));
+        ImpostorSurface { distance, normal }
     }
 
     /// Whether o sees a point of a surface.

@@ -27,8 +27,13 @@ pub struct ImpostorScene<F> {
 /// A guess and its ratio.
 type Guess = (f64, f64);
 
-/// g(d) of a layer; 0, in front of everything, where x + d r has no direction.
-fn ratio<F: Fn(u32, DVec3) -> f64>(scene: &ImpostorScene<F>, layer: u32, ray: &ImpostorRay, d: f64) -> f64 {
+/// g(d) of a layer, |x + d r| over the distance that it has there: below 1 in front of the surface; 0, in front of everything, where x + d r has no direction.
+pub fn impostor_ratio<F: Fn(u32, DVec3) -> f64>(
+    scene: &ImpostorScene<F>,
+    layer: u32,
+    ray: &ImpostorRay,
+    d: f64,
+) -> f64 {
     let l = ray.origin + d * ray.direction;
     let size = l.length();
     if size > 0.0 {
@@ -51,8 +56,8 @@ pub fn impostor_step(guess: (f64, f64), other: Option<(f64, f64)>, far: f64) -> 
     }
 }
 
-/// The guess after so many steps, by secants and brackets.
-fn by_steps<F: Fn(u32, DVec3) -> f64>(
+/// How far a ray goes to the guess after so many steps in a layer, by secants and brackets; of all methods but the classical look-up and the march.
+pub fn impostor_by_steps<F: Fn(u32, DVec3) -> f64>(
     scene: &ImpostorScene<F>,
     layer: u32,
     ray: &ImpostorRay,
@@ -79,14 +84,14 @@ fn by_steps<F: Fn(u32, DVec3) -> f64>(
     let mut is_at_point = matches!(method, SearchMethod::SecantFromPoint | SearchMethod::FalsePosition);
     let mut g = 0.0;
     if is_at_point || method == SearchMethod::Hybrid {
-        g = ratio(scene, layer, ray, 0.0);
+        g = impostor_ratio(scene, layer, ray, 0.0);
         // A point that the map's place does not see is no bracket.
         is_at_point = is_at_point || g <= 1.0;
     }
     if is_at_point {
         begin = 0.0;
     } else {
-        g = ratio(scene, layer, ray, begin);
+        g = impostor_ratio(scene, layer, ray, begin);
     }
     let (mut under, mut over): (Option<Guess>, Option<Guess>) = (None, None);
     let mut last = (begin, g);
@@ -98,7 +103,7 @@ fn by_steps<F: Fn(u32, DVec3) -> f64>(
     }
     let mut d = (begin + impostor_step(last, None, far)).clamp(0.0, reach);
     for _ in 0..settings.steps {
-        let guess = (d, ratio(scene, layer, ray, d));
+        let guess = (d, impostor_ratio(scene, layer, ray, d));
         let other = if is_secant {
             Some(last)
         } else if guess.1 < 1.0 {
@@ -115,8 +120,8 @@ fn by_steps<F: Fn(u32, DVec3) -> f64>(
 }
 
 /// The guess of the first crossing whose residual is below the tolerance, by even steps and bisection; of none, the end where that is in front of everything,
-/// or else the crossing of the least residual.
-fn by_march<F: Fn(u32, DVec3) -> f64>(
+/// or else the crossing of the least residual. How far the ray goes in a layer; settings have a step at least.
+pub fn impostor_by_march<F: Fn(u32, DVec3) -> f64>(
     scene: &ImpostorScene<F>,
     layer: u32,
     ray: &ImpostorRay,
@@ -130,11 +135,11 @@ fn by_march<F: Fn(u32, DVec3) -> f64>(
     } else {
         0.0
     };
-    let mut g_low = ratio(scene, layer, ray, begin);
+    let mut g_low = impostor_ratio(scene, layer, ray, begin);
     if begin > 0.0 && g_low >= 1.0 {
         // Between the centres of coarse texels the surface is nearer than at any of them.
         begin = 0.0;
-        g_low = ratio(scene, layer, ray, begin);
+        g_low = impostor_ratio(scene, layer, ray, begin);
     }
     let end = (1.0 + margin) * sphere_proxy(ray.origin, ray.direction, farthest);
     let step = (end - begin).max(0.0) / f64::from(settings.steps);
@@ -142,19 +147,19 @@ fn by_march<F: Fn(u32, DVec3) -> f64>(
     let (mut best, mut least) = (end, f64::INFINITY);
     for i in 0..settings.steps {
         let high = begin + f64::from(i + 1) * step;
-        let g_high = ratio(scene, layer, ray, high);
+        let g_high = impostor_ratio(scene, layer, ray, high);
         if (g_low < 1.0) != (g_high < 1.0) {
             let (mut a, mut b) = (low, high);
             for _ in 0..settings.bisections {
                 let middle = 0.5 * (a + b);
-                if (ratio(scene, layer, ray, middle) < 1.0) == (g_low < 1.0) {
+                if (impostor_ratio(scene, layer, ray, middle) < 1.0) == (g_low < 1.0) {
                     a = middle;
                 } else {
                     b = middle;
                 }
             }
             let d = 0.5 * (a + b);
-            let residual = (1.0 - ratio(scene, layer, ray, d)).abs();
+            let residual = (1.0 - impostor_ratio(scene, layer, ray, d)).abs();
             if residual < least {
                 (best, least) = (d, residual);
             }
@@ -201,9 +206,9 @@ pub fn impostor_search<F: Fn(u32, DVec3) -> f64>(
     let (mut best, mut is_found) = (nowhere, false);
     for layer in 0..scene.layers {
         let d = if settings.method == SearchMethod::March {
-            by_march(scene, layer, ray, settings)
+            impostor_by_march(scene, layer, ray, settings)
         } else {
-            by_steps(scene, layer, ray, settings)
+            impostor_by_steps(scene, layer, ray, settings)
         };
         let l = x + d * r;
         let v = l.try_normalize();

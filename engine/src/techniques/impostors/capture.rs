@@ -193,7 +193,7 @@ pub(in crate::techniques) struct Capture {
     layers: Option<Layers>,
     impostor: Option<ImpostorImage>,
     counts: CaptureCounts,
-    /// What has traced its paths.
+    /// What has traced its paths, and found its further layers.
     traced_by: Vec<PipelineInfo>,
     is_read: bool,
     is_done: bool,
@@ -204,7 +204,7 @@ pub(in crate::techniques) struct Capture {
 pub(in crate::techniques) struct CaptureCounts {
     /// Paths begun.
     pub paths: u64,
-    /// Rays of all kinds.
+    /// Rays of all kinds, those that find further layers among them.
     pub rays: u64,
     /// Paths that were left out since they brought no finite number.
     pub non_finite: u64,
@@ -248,6 +248,7 @@ impl Capture {
     /// What draws and shades it, and traces its paths once they are under way.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = self.drawing.pipelines();
+        all.extend(self.layers.iter().flat_map(Layers::pipelines));
         all.extend(self.tracer.iter().flat_map(|tracer| tracer.pipelines()));
         all.extend(self.traced_by.iter().cloned());
         all
@@ -324,10 +325,12 @@ impl Capture {
 
     /// Makes an impostor of the layers, where one is wanted.
     fn finish(&mut self) -> Result<()> {
-        if let Some(layers) = self.layers.take()
-            && self.plan.with_distances
-        {
-            self.impostor = Some(layers.image()?);
+        if let Some(layers) = self.layers.take() {
+            self.counts.rays += layers.rays();
+            self.traced_by.extend(layers.pipelines());
+            if self.plan.with_distances {
+                self.impostor = Some(layers.image()?);
+            }
         }
         self.is_done = true;
         Ok(())

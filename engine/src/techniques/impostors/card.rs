@@ -49,13 +49,18 @@ const DISPLAYED: &str = "L(S?|[^S]|.S)E";
 
 /// Why a scene cannot be modelled by a map of its surfaces.
 pub(in crate::techniques) fn refusals(profile: &SceneProfile) -> Vec<String> {
+    refusals_with(profile, false)
+}
+
+/// The same where rays may be refracted.
+pub(super) fn refusals_with(profile: &SceneProfile, refracts: bool) -> Vec<String> {
     reasons(&[
         (
             profile.media.any(),
             "the scene has participating media, and the map holds surfaces only",
         ),
         (
-            profile.has_transmission(),
+            profile.has_transmission() && !refracts,
             "surfaces transmit light, and nothing is followed through them",
         ),
         (

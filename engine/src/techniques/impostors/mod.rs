@@ -7,6 +7,9 @@
 //! followed through the map, and the radiance that the map has there, times what the surface mirrors, is added. With light of so many scatterings in the map as
 //! the setting says, one by default, pictures have the paths `LE|L.E|L.SE`: light that is seen in a mirror comes from the map alone.
 //!
+//! Hosts may have smooth glass [refract](ReflectionSettings::refracts) as well, at the interface that the eye sees first: the refracted ray is followed through the same map, beyond the body's other side as if that were not there.
+//! Both rays have the weights of the exact dielectric factor, and beyond the critical angle all is mirrored.
+//!
 //! The map is captured once, before the first sample, and holds for all cameras. What reflects is left out of it, so that it may be seen from within; its shadow is in it.
 //!
 //! Bias, all of it:
@@ -21,7 +24,7 @@
 //!
 //! In the limit of many texels and steps, what convex rooms of diffuse walls show in a convex mirror is exact.
 //!
-//! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit, and scenes that keep their instances.
+//! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit where they do not refract, and scenes that keep their instances.
 
 pub(in crate::techniques) mod capture;
 mod card;

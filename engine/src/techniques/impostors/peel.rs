@@ -17,7 +17,7 @@ use crate::Result;
 use crate::accel::trace::{RayTracer, TraceSettings};
 use crate::accel::{NO_HIT, Ray};
 use crate::gpu::shaders::types::SceneTriangle;
-use crate::gpu::{Gpu, Timings};
+use crate::gpu::{Gpu, PipelineInfo, Timings};
 use crate::maps::Texel;
 use crate::maps::impostor::ImpostorImage;
 use crate::raster::ObjectTriangles;
@@ -43,6 +43,8 @@ pub(super) struct Layers {
     drawn: Vec<u32>,
     /// For layers behind the first.
     tracing: Option<Tracing>,
+    /// Rays that were traced for them.
+    rays: u64,
 }
 
 #[derive(Default)]
@@ -83,7 +85,12 @@ impl Tracing {
         let [a, b, c] = [corners.a, corners.b, corners.c].map(|v| Vec3::from_array(v).as_dvec3());
         let normal = (b - a).cross(c - a).normalize_or(-along);
         let turns_away = normal.dot(along) > 0.0;
-        let owner = self.objects.iter().find(|object| object.triangles.contains(&triangle));
+        // In the order of their triangles.
+        let before = self.objects.partition_point(|object| object.triangles.end <= triangle);
+        let owner = self
+            .objects
+            .get(before)
+            .filter(|object| object.triangles.contains(&triangle));
         let object = owner.map_or(u32::MAX, |owner| owner.object);
         (Side { object, turns_away }, if turns_away { -normal } else { normal })
     }
@@ -103,6 +110,7 @@ impl Layers {
             }],
             drawn: triangles,
             tracing: None,
+            rays: 0,
         }
     }
 
@@ -175,6 +183,7 @@ impl Layers {
         for _ in 0..LEFT_OUT_MAX {
             let rays: Vec<Ray> = waiting.iter().map(|(_, ray)| *ray).collect();
             let traced = tracing.tracer.trace(&rays)?;
+            self.rays += rays.len() as u64;
             timings.passes.extend(traced.timings.passes);
             let mut left = Vec::new();
             for ((texel, _), hit) in waiting.into_iter().zip(traced.hits) {
@@ -221,6 +230,17 @@ impl Layers {
             ((1.0 - LEAD) * distance).max(0.5 * (last + distance))
         };
         (0..own.distances.len()).map(start).collect()
+    }
+
+    /// Rays that were traced for layers behind the first.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// What has traced them.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let tracing = self.tracing.iter();
+        tracing.map(|tracing| tracing.tracer.pipeline()).collect()
     }
 
     /// All layers as an impostor.
@@ -292,6 +312,7 @@ mod tests {
             ],
             drawn: Vec::new(),
             tracing: None,
+            rays: 0,
         };
         let before = 1.0 - LEAD;
         assert_eq!(layers.starts(0, 9.0), [before, 2.0 * before, 9.0, 2.0 * before]);

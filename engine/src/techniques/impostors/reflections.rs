@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::capture::{Capture, CaptureBy, CapturePlan, Captured, middle_of};
-use super::card::refusals;
+use super::card::refusals_with;
 use super::renderer::{MapRenderer, MapUse, eye_settings};
 use super::settings::ReflectionSettings;
 use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
@@ -105,7 +105,7 @@ impl ImpostorReflections {
     ///
     /// # Errors
     /// [`Error::Setting`] for a setting or size out of range, and for a reflector that is none; [`Error::Unsupported`] for a scene with participating media, with
-    /// surfaces that transmit or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
+    /// surfaces that transmit, unless they are to [refract](ReflectionSettings::refracts), or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
     /// [`Error::OutOfMemory`].
     pub fn new(
         gpu: &Gpu,
@@ -115,7 +115,7 @@ impl ImpostorReflections {
         settings: ReflectionSettings,
     ) -> Result<Self> {
         settings.check()?;
-        let reasons = refusals(scene.profile());
+        let reasons = refusals_with(scene.profile(), settings.refracts);
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
                 technique: TECHNIQUE.into(),

@@ -115,6 +115,8 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
+        /// Smooth surfaces that transmit show what lies along the refracted ray, too, at one interface: as if bodies had no other side. Without it scenes with such surfaces are refused.
+        pub refracts: bool = false;
         /// Keeps what the reflected rays of the last wave were and where they were found: [`ImpostorReflections::looked_up`](super::ImpostorReflections::looked_up).
         pub keeps_look_ups: bool = false;
     }

@@ -16,10 +16,10 @@ use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
 use crate::{Error, Result};
 
-/// A reflected ray, and where the map was looked up for it.
+/// A reflected ray, or a refracted one, and where the map was looked up for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LookUp {
-    /// The eye path's slot in its wave: with a sample per pixel and one wave, the pixel.
+    /// The eye path's slot in its wave: with a sample per pixel and one wave, the pixel. Of two rays of a path the refracted one is kept.
     pub slot: u32,
     /// Where the ray begins, from the map's place, metres.
     pub origin: Vec3,
@@ -35,7 +35,7 @@ pub struct LookUp {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[non_exhaustive]
 pub struct LookUpCounts {
-    /// Reflected rays.
+    /// Reflected and refracted rays.
     pub reflections: u64,
     /// Those that left to the sky.
     pub sky: u64,
@@ -89,6 +89,7 @@ impl Reflections {
             impostor_planes: impostor.is_some(),
             reflects_in_box: settings.method == ReflectionMethod::Box,
             keeps_look_ups: settings.keeps_look_ups,
+            refracts: settings.refracts,
             ..Default::default()
         });
         let bytes = size_of::<Counters>() as u64;

@@ -1,7 +1,7 @@
 //! The raster preview as a technique.
 
 use super::drawing::LIGHTS_MAX;
-use super::{PreviewMethod, PreviewSettings, live, planar, probe, reflection};
+use super::{PreviewMethod, PreviewSettings, fading, live, planar, probe, reflection};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::maps::{directional_border, directional_coarser, prefilter_ggx};
@@ -44,7 +44,14 @@ pub(super) const NO_PHONG: &str = "its probes are not filtered by modified Phong
 pub(in crate::techniques) const CARD: Card = Card {
     id: "preview",
     summary: "raster preview: surfaces from a G-buffer, lights with shadow maps, the environment as a filtered probe; a picture per frame",
-    rows: &[ROWS, live::ROWS, planar::ROWS, probe::ROWS, reflection::ROWS],
+    rows: &[
+        ROWS,
+        fading::ROWS,
+        live::ROWS,
+        planar::ROWS,
+        probe::ROWS,
+        reflection::ROWS,
+    ],
     bias: BIAS,
     needs: NEEDS,
     kernels: &[&KERNELS],

@@ -147,47 +147,32 @@ impl LiveProbe {
 }
 
 /// Rows of the catalogue.
-pub(super) const ROWS: &[Row] = &[
-    Row {
-        id: "CL-LIVE-MAP",
-        name: "live maps: light at a place drawn each frame as an octahedron, for reflections of objects that move",
-        role: Role::PartOf("CL-PREVIEW"),
-        limits: "No parallax: a reflection shows what lies in its direction from the map's own place.",
-        sources: &[
-            sources::BLINN_NEWELL_1976.whole(),
-            sources::GREENE_1986.whole(),
-            sources::ENGELHARDT_DACHSBACHER_2008.whole(),
-        ],
-        shaders: &[
-            "shaders/techniques/preview/probe.glsl",
-            "shaders/techniques/preview/preview_shade.comp",
-            "shaders/raster/surface_octant.vert",
-            "shaders/maps/directional_coarser.comp",
-            "shaders/maps/directional_border.comp",
-            "shaders/maps/prefilter_ggx.comp",
-        ],
-        bias: Some(Bias::Biased("radiance at texel centres; parallax beside its place")),
-        tests: &[
-            "tests/tests/preview/live.rs::irradiance_in_a_closed_room_is_that_of_rays",
-            "tests/tests/preview/live.rs::reflections_at_the_middle_are_those_of_rays",
-            "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
-            "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
-        ],
-        api: &["clerestory::techniques::preview::LiveProbe"],
-        settings: &["clerestory::techniques::preview::LightProbeDesc"],
-        ..Row::of(file!())
-    },
-    Row {
-        id: "MET-E2",
-        name: "a map drawn anew at the place of an object that moves",
-        role: Role::PartOf("CL-LIVE-MAP"),
-        limits: "A fresh map leaves a sphere of a third of a room's half width ten degrees of parallax.",
-        sources: &[sources::GREENE_1986.whole(), sources::SZIRMAY_KALOS_2009.whole()],
-        bias: Some(Bias::Biased("no parallax beside its place")),
-        tests: &[
-            "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
-            "engine/src/maps/impostor/tests/searches.rs::a_fresh_map_leaves_parallax",
-        ],
-        ..Row::of(file!())
-    },
-];
+pub(super) const ROWS: &[Row] = &[Row {
+    id: "CL-LIVE-MAP",
+    name: "live maps: light at a place drawn each frame as an octahedron, for reflections of objects that move",
+    role: Role::PartOf("CL-PREVIEW"),
+    limits: "No parallax: a reflection shows what lies in its direction from the map's own place.",
+    sources: &[
+        sources::BLINN_NEWELL_1976.whole(),
+        sources::GREENE_1986.whole(),
+        sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+    ],
+    shaders: &[
+        "shaders/techniques/preview/probe.glsl",
+        "shaders/techniques/preview/preview_shade.comp",
+        "shaders/raster/surface_octant.vert",
+        "shaders/maps/directional_coarser.comp",
+        "shaders/maps/directional_border.comp",
+        "shaders/maps/prefilter_ggx.comp",
+    ],
+    bias: Some(Bias::Biased("radiance at texel centres; parallax beside its place")),
+    tests: &[
+        "tests/tests/preview/live.rs::irradiance_in_a_closed_room_is_that_of_rays",
+        "tests/tests/preview/live.rs::reflections_at_the_middle_are_those_of_rays",
+        "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
+        "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
+    ],
+    api: &["clerestory::techniques::preview::LiveProbe"],
+    settings: &["clerestory::techniques::preview::LightProbeDesc"],
+    ..Row::of(file!())
+}];

@@ -6,7 +6,7 @@
 //!
 //! What it shows: emission; point, spot and directional lights, through shadow maps where they have a place; light of a [`LightProbe`] by two
 //! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact albedo,
-//! but for rough metals by another factor than Schlick's. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them;
+//! but for rough metals by another factor than Schlick's. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them, each frame, or as a [`FadingProbe`] now and then;
 //! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table; and a [`PlanarMirror`] is a second picture,
 //! of what a plane shows.
 //!
@@ -31,6 +31,7 @@
 
 mod card;
 mod drawing;
+mod fading;
 mod lights;
 mod live;
 mod method;
@@ -40,6 +41,7 @@ mod reflection;
 mod shade;
 
 pub(super) use card::CARD;
+pub use fading::{FadingProbe, Refresh, RefreshStep};
 pub use lights::{PreviewLights, PreviewShadows};
 pub use live::LiveProbe;
 pub use method::{PreviewMethod, PreviewSettings};

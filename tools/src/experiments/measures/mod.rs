@@ -116,6 +116,7 @@ measures! {
     on_host "fresnel-stripes" surfaces::fresnel_stripes;
     on_host "fuzzing" files::fuzzing;
     on_device "gather-counts" impostors::gather_counts;
+    on_device "gather-frame" impostors::gather_frame;
     on_device "gather-glossy" impostors::gather_glossy;
     on_device "gather-places" impostors::gather_places;
     on_device "gather-table" impostors::gather_table;
@@ -181,6 +182,7 @@ measures! {
     on_device "technique-choice" rendering::technique_choice;
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
+    on_host "virtual-images" impostors::virtual_images;
     on_device "volume-bandwidths" photons::volume_bandwidths;
     on_host "vpl-order" virtual_lights::vpl_order;
     on_device "vpl-potential" virtual_lights::vpl_potential;

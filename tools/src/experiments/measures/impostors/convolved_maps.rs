@@ -1,6 +1,6 @@
 //! Maps that are convolved once for all points: by the cosine for matte surfaces, by lobes for glossy ones.
 //!
-//! Oracles: the exact irradiance of the lit room at the map's place, for the widest lobe, which is the cosine; and the map itself, whose mean a filter keeps.
+//! Oracles: the exact irradiance of the lit room at the map's place, for the widest lobe, which is the cosine; and the map itself, whose mean a filter keeps, and whose radiance few numbers stand for.
 
 use std::f64::consts::PI;
 
@@ -8,7 +8,9 @@ use clerestory::Result;
 use clerestory::maps::gather::GatherPoint;
 use clerestory::maps::gather::lit_room::{LitRoom, relative_errors};
 use clerestory::maps::harmonics::HarmonicLight;
+use clerestory::maps::irradiance::IrradianceSource;
 use clerestory::maps::prefilter::prefilter_ggx;
+use clerestory::maps::wavelets::WaveletLight;
 use clerestory::maps::{MapImage, Parametrization};
 use glam::{DVec3, UVec2};
 
@@ -44,12 +46,31 @@ rows! {
     }
 }
 
+rows! {
+    /// Light in wavelets beside harmonics.
+    struct Wavelets = "Radiance by the greatest wavelets, and by harmonics" by [numbers] {
+        numbers: u64 = "terms",
+        lost: f64 = "lost by wavelets (%)",
+        by_harmonics: f64 = "lost by as many harmonics (%)",
+        share: f64 = "one over the other",
+        off: f64 = "irradiance by wavelets: RMS against the exact one (%)",
+    }
+}
+
 /// What was found.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
     maps: Vec<Row>,
     harmonics: Vec<Harmonics>,
+    wavelets: Vec<Wavelets>,
 }
+
+const OF_WAVELETS: &[Criterion<Wavelets>] = &[Criterion::each(
+    "wavelets hold edges that harmonics blur: what they lose over what harmonics do",
+    Bound::AtMost(0.6),
+    |row: &Wavelets| row.share.into(),
+)
+.in_every_form()];
 
 const OF_HARMONICS: &[Criterion<Harmonics>] = &[
     Criterion::each(
@@ -66,6 +87,49 @@ const OF_HARMONICS: &[Criterion<Harmonics>] = &[
     )
     .among(|row| row.order == 4),
 ];
+
+/// The greatest wavelets, as many as harmonics of orders 2 to 8, and the irradiance of what they keep.
+fn wavelets(room: &LitRoom, map: &MapImage, points: u32) -> Result<Vec<Wavelets>> {
+    let points = LitRoom::points(DVec3::ZERO, points);
+    let exact: Vec<f64> = points
+        .iter()
+        .map(|point| {
+            room.irradiance(&GatherPoint {
+                position: DVec3::ZERO,
+                ..*point
+            })
+        })
+        .collect();
+    let (kind, size) = (map.map(), map.size());
+    let power = |value: &dyn Fn(usize, f64) -> f64| {
+        let of = |(i, texel)| kind.texel_solid_angle(size, texel) * value(i, f64::from(map.at(texel).x)).powi(2);
+        kind.texels(size).enumerate().map(of).sum::<f64>()
+    };
+    let whole = power(&|_, value| value);
+    let row = |order: u32| {
+        let harmonics = HarmonicLight::new(map, order)?;
+        let light = WaveletLight::new(map, harmonics.numbers())?;
+        let directions = kind.texels(size).map(|texel| kind.texel_direction(size, texel));
+        let kept: Vec<f64> = directions
+            .map(|direction| direction.map_or(0.0, |direction| harmonics.radiance(direction).x))
+            .collect();
+        let by_harmonics = power(&|i, value| value - kept[i]) / whole;
+        let image = light.image()?;
+        let source = IrradianceSource::new(&image);
+        let found: Vec<f64> = points
+            .iter()
+            .map(|point| source.irradiance(point.axis).map_or(0.0, |irradiance| irradiance.x))
+            .collect();
+        Ok(Wavelets {
+            numbers: light.numbers() as u64,
+            lost: 100.0 * light.lost(),
+            by_harmonics: 100.0 * by_harmonics,
+            share: light.lost() / by_harmonics,
+            off: relative_errors(&found, &exact)[0],
+        })
+    };
+    [2, 4, 6, 8].into_iter().map(row).collect()
+}
 
 /// Harmonics of orders 0 to 6 at points of the unit sphere about the map's place.
 fn harmonics(room: &LitRoom, map: &MapImage, count: u32) -> Result<Vec<Harmonics>> {
@@ -189,6 +253,7 @@ impl Study for Found {
         Ok(Self {
             maps: rows,
             harmonics: harmonics(&room, &radiance, context.pick(400, 20))?,
+            wavelets: wavelets(&room, &radiance, context.pick(400, 20))?,
         })
     }
 
@@ -201,6 +266,7 @@ impl Study for Found {
             )
             .note("A cube of 32² texels a face of a room with walls of different radiance and a bright patch, seen from its middle, convolved into 16² texels a face.")
             .and(Findings::of(&self.harmonics, OF_HARMONICS).note("Of the same map, in place of a convolved one; the third and the fifth order add nothing to irradiance."))
+            .and(Findings::of(&self.wavelets, OF_WAVELETS).note("Of the same map; what is lost is the squared error over the square of the radiance, in the mean over all directions. A wavelet takes its place beside its value."))
             .curves(
                 "contrast",
                 "What is left of the room's contrast",

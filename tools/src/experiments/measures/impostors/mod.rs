@@ -3,6 +3,7 @@
 pub mod convolved_maps;
 pub mod exact_room;
 pub mod gather_counts;
+pub mod gather_frame;
 pub mod gather_glossy;
 pub mod gather_places;
 pub mod gather_table;
@@ -11,3 +12,4 @@ pub mod impostor_methods;
 pub mod impostor_motion;
 pub mod impostor_occlusion;
 pub mod impostor_roots;
+pub mod virtual_images;
