@@ -135,7 +135,9 @@ mod tests {
 
     #[test]
     fn shares_are_found_whatever_the_law() {
-        let laws: [(f64, fn(f64) -> f64); 4] = [
+        /// Dimensions of the kernels, and how many are met by the share.
+        type Met = (f64, fn(f64) -> f64);
+        let laws: [Met; 4] = [
             (2.0, |share| 4000.0 * share * share),
             (1.0, |share| 900.0 * share),
             // Most are met already, under wide kernels.
