@@ -62,8 +62,8 @@ pub(crate) fn mutant_module(name: &str) -> Option<Vec<u8>> {
 SWITCH_FILE = "engine/src/lib.rs"
 # Where modules become the driver's.
 LOADER = "engine/src/gpu/layout.rs"
-LOAD = "        let words = ash::util::read_spv("
-LOAD_MUTANT = "        let other = crate::mutant_module(name);\n        let spirv = other.as_deref().unwrap_or(spirv);\n"
+LOAD = "    ash::util::read_spv("
+LOAD_MUTANT = "    let other = crate::mutant_module(name);\n    let spirv = other.as_deref().unwrap_or(spirv);\n"
 
 
 def say(text):
