@@ -5,7 +5,7 @@
 //!
 //! What is done: constants get their values, expressions of them too; branches on known conditions become jumps, with the selections that they headed; blocks that
 //! nothing reaches are left out, with their places in phi instructions, names and decorations. A block that a structured construct names stays, without content.
-//! Nothing is moved and no arithmetic of floating point is evaluated, so that what is left computes the same bits.
+//! Nothing is moved, and no operation that stays is changed; arithmetic of floating point is never evaluated. Modules must be valid.
 //!
 //! Source of the rules: SPIR-V specification 1.3, §2.11 (structured control flow) and §2.4 (logical layout).
 
@@ -31,6 +31,11 @@ mod op {
     pub const FUNCTION: u32 = 54;
     pub const FUNCTION_END: u32 = 56;
     pub const DECORATE: u32 = 71;
+    pub const DECORATION_GROUP: u32 = 73;
+    pub const GROUP_DECORATE: u32 = 74;
+    pub const GROUP_MEMBER_DECORATE: u32 = 75;
+    pub const DECORATE_ID: u32 = 332;
+    pub const DECORATE_STRING: u32 = 5632;
     pub const I_ADD: u32 = 128;
     pub const I_SUB: u32 = 130;
     pub const I_MUL: u32 = 132;
@@ -146,8 +151,14 @@ pub(super) fn specialize(module: &[u32], values: &[(u32, u32)]) -> Option<Vec<u3
     let instructions = split(module.get(HEADER..)?)?;
     let mut spec_ids = HashMap::new();
     let mut types = HashSet::new();
+    // Literals of a switch over these are of two words.
+    let has_long_ints = instructions
+        .iter()
+        .any(|words| opcode(words) == op::TYPE_INT && words.get(2) == Some(&64));
     for words in &instructions {
         match opcode(words) {
+            op::DECORATION_GROUP | op::GROUP_DECORATE | op::GROUP_MEMBER_DECORATE => return None,
+            op::SWITCH if has_long_ints => return None,
             op::DECORATE if words.len() == 4 && words[2] == op::DECORATION_SPEC_ID => {
                 spec_ids.insert(words[1], words[3]);
             }
@@ -174,7 +185,10 @@ pub(super) fn specialize(module: &[u32], values: &[(u32, u32)]) -> Option<Vec<u3
     }
     let mut out = module[..HEADER].to_vec();
     for words in constants {
-        let is_of_removed = matches!(opcode(&words), op::NAME | op::DECORATE) && gone.contains(&words[1]);
+        let is_of_removed = matches!(
+            opcode(&words),
+            op::NAME | op::DECORATE | op::DECORATE_ID | op::DECORATE_STRING
+        ) && gone.contains(&words[1]);
         let is_interface = opcode(&words) == op::DECORATE && words[2] == op::DECORATION_SPEC_ID;
         if !is_of_removed && !is_interface {
             out.extend(words);
@@ -339,12 +353,18 @@ fn write_function(
         kept.extend(bound);
     };
     let is_reached = |block: &&Block<'_>| flow.reached.contains(&block.label);
-    // Constructs name their merge blocks, and loops where they go on.
+    let place: HashMap<u32, usize> = blocks.iter().enumerate().map(|(i, block)| (block.label, i)).collect();
+    let goes_back = |header: u32| {
+        flow.edges
+            .iter()
+            .any(|(from, to)| *to == header && place[from] >= place[to])
+    };
+    // Constructs name their merge blocks, and loops where they go on; these must have a way back.
     let mut named = HashSet::new();
     for block in blocks.iter().filter(is_reached) {
         if let Some(merge) = block.merge().filter(|_| !drops_merge(block, &flow)) {
             named.insert(merge[1]);
-            if opcode(merge) == op::LOOP_MERGE && !flow.reached.contains(&merge[2]) {
+            if opcode(merge) == op::LOOP_MERGE && !(flow.reached.contains(&merge[2]) && goes_back(block.label)) {
                 return None;
             }
         }
@@ -429,7 +449,10 @@ fn flow_of(blocks: &[Block<'_>], known: &Known, kept: &HashSet<u32>) -> Option<F
             None => targets,
         };
         for target in targets {
-            flow.reached.insert(target);
+            // What is new must come later, or this pass has gone by it.
+            if flow.reached.insert(target) && goes_back(&target) {
+                return None;
+            }
             flow.edges.insert((block.label, target));
         }
     }
