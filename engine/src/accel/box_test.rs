@@ -79,7 +79,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/box_test/tests.rs::spans_of_rays_at_faces_edges_and_corners_are_those_of_f64",
         "engine/src/accel/box_test/tests.rs::boxes_are_met_up_to_their_slack_and_no_further",
         "engine/src/accel/photon_map/compact_bvh/tests.rs::no_layout_culls_what_the_triangle_test_reports",
-        "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+        "tests/tests/accel/lbvh.rs::compact_queries_are_the_twins",
     ],
     api: &["clerestory::accel::box_test::BoxTest"],
     ..Row::of(file!())

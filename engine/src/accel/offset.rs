@@ -90,7 +90,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/offset/tests.rs::leaving_rays_meet_neither_their_triangle_nor_coplanar_ones",
         "engine/src/accel/offset/tests.rs::shadow_segments_meet_neither_end_but_what_is_between",
         "tests/tests/twins/geometry.rs::surface_points_and_ray_starts_agree_with_their_twins",
-        "tests/tests/path_tracer.rs::a_light_in_a_lambert_sphere_fills_it_evenly",
+        "tests/tests/paths/path_tracer.rs::a_light_in_a_lambert_sphere_fills_it_evenly",
     ],
     api: &["clerestory::accel::offset"],
     ..Row::of(file!())

@@ -540,9 +540,9 @@ pub(crate) const ROWS: &[Row] = &[
         sources: &[sources::AILA_LAINE_2009.whole()],
         shaders: &["shaders/accel/trace_rays.comp"],
         tests: &[
-            "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
-            "tests/tests/ray_index.rs::kernels_are_their_twins_on_soups",
-            "tests/tests/ray_index.rs::kernels_are_their_twins_on_hard_cases",
+            "tests/tests/accel/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+            "tests/tests/accel/ray_index.rs::kernels_are_their_twins_on_soups",
+            "tests/tests/accel/ray_index.rs::kernels_are_their_twins_on_hard_cases",
         ],
         api: &["clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
@@ -559,10 +559,10 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         shaders: &["shaders/accel/trace_queue.comp", "shaders/accel/trace_queue_vote.comp"],
         tests: &[
-            "tests/tests/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
-            "tests/tests/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
-            "tests/tests/persistent_threads.rs::a_queue_of_many_rays_traces_each_once",
-            "tests/tests/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
+            "tests/tests/accel/persistent_threads.rs::both_models_trace_every_ray_once_and_find_what_the_twin_finds",
+            "tests/tests/accel/persistent_threads.rs::a_queue_without_a_quota_loses_rays_where_loops_are_capped_and_one_with_a_quota_none",
+            "tests/tests/accel/persistent_threads.rs::a_queue_of_many_rays_traces_each_once",
+            "tests/tests/accel/persistent_threads.rs::settings_that_could_lose_rays_are_refused",
         ],
         api: &["clerestory::accel::trace::RayTracer"],
         settings: &[

@@ -130,8 +130,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/accel/triangle/tests.rs::hits_keep_their_stated_error_and_misses_are_right",
         "engine/src/accel/triangle/tests.rs::edges_and_vertices_belong_to_both_sides",
         "engine/src/accel/bvh2/tests.rs::no_ray_passes_between_the_triangles_of_a_sphere",
-        "tests/tests/seams.rs::no_ray_is_lost_at_seams_in_any_index",
-        "tests/tests/seams.rs::kernels_lose_no_ray_at_seams_in_any_index",
+        "tests/tests/accel/seams.rs::no_ray_is_lost_at_seams_in_any_index",
+        "tests/tests/accel/seams.rs::kernels_lose_no_ray_at_seams_in_any_index",
         "tests/tests/twins/geometry.rs::triangles_agree_with_their_twins",
     ],
     api: &[

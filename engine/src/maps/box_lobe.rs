@@ -340,7 +340,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/box_lobes.rs::the_staircase_is_the_best_one",
         "engine/src/maps/tests/box_lobes.rs::borders_hold_the_largest_box",
         "engine/src/maps/tests/box_lobes.rs::constant_radiance_is_constant_through_every_lobe",
-        "tests/tests/directional_maps.rs::lobes_are_their_twins",
+        "tests/tests/maps/directional_maps.rs::lobes_are_their_twins",
     ],
     api: &[
         "clerestory::maps::box_lobe::box_lobe",

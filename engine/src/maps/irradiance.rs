@@ -172,7 +172,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/irradiance.rs::a_sky_that_fades_to_the_horizon_gives_two_thirds_of_pi",
         "engine/src/maps/tests/irradiance.rs::a_sun_of_one_texel_is_lamberts_polygon",
         "engine/src/maps/tests/irradiance.rs::maps_of_irradiance_hold_it_for_every_normal",
-        "tests/tests/directional_maps.rs::the_widest_lobe_is_irradiance",
+        "tests/tests/maps/directional_maps.rs::the_widest_lobe_is_irradiance",
     ],
     api: &[
         "clerestory::maps::irradiance::irradiance_map",

@@ -49,7 +49,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/solid_angles.rs::rectangles_have_the_integral_of_the_density",
         "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
-        "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
+        "tests/tests/maps/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
     api: &[
         "clerestory::maps::nusselt::nusselt_encode",

@@ -219,7 +219,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
             "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
             "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
-            "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
+            "tests/tests/maps/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
         ],
         api: &[
             "clerestory::maps::octahedron::octahedron_encode",
@@ -245,7 +245,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/tests/levels.rs::the_octants_own_map_has_no_seams",
             "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
             "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
-            "tests/tests/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
+            "tests/tests/maps/directional_maps.rs::shadows_by_octahedron_and_cube_are_as_good",
         ],
         api: &[
             "clerestory::maps::octahedron::octahedron_rectangular_encode",

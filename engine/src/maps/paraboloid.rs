@@ -58,7 +58,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
         "engine/src/maps/tests/density.rs::ratios_along_great_circles_are_those_of_the_figures",
-        "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
+        "tests/tests/maps/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
     api: &[
         "clerestory::maps::paraboloid::paraboloid_encode",

@@ -183,8 +183,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
     sources: &[sources::KAUTZ_2000.whole(), sources::KARIS_2013.whole()],
     shaders: &["shaders/maps/prefilter_ggx.comp"],
     tests: &[
-        "tests/tests/directional_maps.rs::filtered_maps_are_sums_over_the_lobe",
-        "tests/tests/directional_maps.rs::constant_radiance_stays_constant",
+        "tests/tests/maps/directional_maps.rs::filtered_maps_are_sums_over_the_lobe",
+        "tests/tests/maps/directional_maps.rs::constant_radiance_stays_constant",
         "tests/tests/preview/light.rs::rough_reflections_are_close_to_the_path_tracers",
         "engine/src/maps/tests/glossy.rs::filtered_maps_are_integrals_of_the_lobe",
         "engine/src/maps/tests/glossy.rs::lobes_have_the_width_that_is_said",

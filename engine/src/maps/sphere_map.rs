@@ -62,7 +62,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/maps/tests/density.rs::anisotropies_are_those_of_the_table",
         "tests/tests/twins/maps.rs::maps_agree_with_their_twins",
         "tests/tests/twins/maps.rs::directions_come_back_in_single_precision",
-        "tests/tests/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
+        "tests/tests/maps/directional_maps.rs::look_ups_in_cubes_and_discs_are_their_twins",
     ],
     api: &[
         "clerestory::maps::sphere_map::sphere_map_encode",

@@ -100,9 +100,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/metals/bins.rs::bins_converge_to_the_observers_tables",
         "engine/src/scene/metals/bins.rs::weights_keep_grey_and_lines",
         "engine/src/scene/metals/bins.rs::channels_lose_what_bins_keep",
-        "tests/tests/spectral_metals.rs::bins_are_summed_to_the_colour_of_two_reflections",
-        "tests/tests/spectral_metals.rs::grey_metals_have_no_colour_in_bins",
-        "tests/tests/spectral_metals.rs::colours_without_a_spectrum_are_refused",
+        "tests/tests/paths/spectral_metals.rs::bins_are_summed_to_the_colour_of_two_reflections",
+        "tests/tests/paths/spectral_metals.rs::grey_metals_have_no_colour_in_bins",
+        "tests/tests/paths/spectral_metals.rs::colours_without_a_spectrum_are_refused",
     ],
     api: &[
         "clerestory::render::spectral::render_spectral",

@@ -511,9 +511,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Knows what a scene holds, not what is seen of it.",
     sources: &[sources::KHRONOS_SPIRV.at("2.12, specialization constants")],
     tests: &[
-        "tests/tests/profile.rs::what_is_absent_costs_no_pass",
-        "tests/tests/profile.rs::what_is_absent_costs_no_byte",
-        "tests/tests/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
+        "tests/tests/paths/profile.rs::what_is_absent_costs_no_pass",
+        "tests/tests/paths/profile.rs::what_is_absent_costs_no_byte",
+        "tests/tests/paths/profile.rs::features_that_are_compiled_in_without_need_change_no_bit",
     ],
     api: &["clerestory::scene::SceneProfile"],
     ..Row::of(file!())

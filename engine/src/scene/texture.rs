@@ -78,7 +78,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     shaders: &["shaders/scene/texture.glsl"],
     tests: &[
         "engine/src/scene/texture.rs::half_texels_and_wrap_modes_meet_at_borders",
-        "tests/tests/twin_texture.rs::look_ups_agree_with_their_twins",
+        "tests/tests/twins/twin_texture.rs::look_ups_agree_with_their_twins",
     ],
     experiment: "tools/models",
     api: &["clerestory::scene::texture"],

@@ -181,7 +181,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/random.rs::sobol_pairs_are_stratified_plain_and_scrambled",
             "engine/src/transport/random.rs::joint_points_are_stratified_across_slots",
             "engine/src/transport/random.rs::owen_hash_changes_a_bit_by_the_lower_bits_only",
-            "tests/tests/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
+            "tests/tests/paths/samplers.rs::sobol_samples_of_a_pixel_are_stratified",
             "tests/tests/twins/random.rs::random_numbers_are_equal_bit_for_bit",
         ],
         settings: &["sampler"],

@@ -142,7 +142,7 @@ mod tests {
         );
         for (i, test) in [
             "tests/tests/photon/sphere.rs::furnaces_are_uniform",
-            "tests/tests/path_tracer.rs::furnaces",
+            "tests/tests/paths/path_tracer.rs::furnaces",
             "engine/src/film/metrics.rs::flip",
         ]
         .iter()
@@ -151,6 +151,8 @@ mod tests {
             let found: Vec<usize> = (0..ran.len()).filter(|k| is(&ran[*k], test)).collect();
             assert_eq!(found, [i], "{test}");
         }
-        assert!(!is(&ran[1], "tests/tests/path_sets.rs::furnaces") && !is(&ran[2], "tests/tests/metrics.rs::flip"));
+        assert!(
+            !is(&ran[1], "tests/tests/paths/path_sets.rs::furnaces") && !is(&ran[2], "tests/tests/metrics.rs::flip")
+        );
     }
 }

@@ -23,6 +23,7 @@ mod searches;
 mod shadows;
 mod sums;
 mod tables;
+mod twin_texture;
 
 use clerestory::gpu::Gpu;
 use clerestory_tests::random::Random;

@@ -141,8 +141,8 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
             "engine/src/accel/kd/tests.rs::bytes_are_eight_for_each_node_and_entry_that_memory_serves",
-            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
-            "tests/tests/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
+            "tests/tests/accel/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/accel/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
@@ -157,8 +157,8 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
-            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
-            "tests/tests/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
+            "tests/tests/accel/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/accel/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
@@ -173,7 +173,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
-            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/accel/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
@@ -188,7 +188,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
-            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/accel/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
@@ -204,7 +204,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
             "engine/src/accel/kd/tests.rs::a_leaf_that_waits_lets_its_ray_go_on_to_the_next",
-            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/accel/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
@@ -221,8 +221,8 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         shaders: &["shaders/accel/trace_queue_vote.comp"],
         tests: &[
-            "tests/tests/kd.rs::votes_change_no_hit",
-            "tests/tests/kd.rs::rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none",
+            "tests/tests/accel/kd.rs::votes_change_no_hit",
+            "tests/tests/accel/kd.rs::rays_that_hold_a_leaf_go_on_while_others_of_their_subgroup_have_none",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],
@@ -237,8 +237,8 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd_cache.glsl"],
         tests: &[
             "engine/src/accel/kd/tests.rs::caches_change_where_work_is_done_and_no_hit",
-            "tests/tests/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
-            "tests/tests/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
+            "tests/tests/accel/kd.rs::caches_are_those_of_the_twin_and_change_no_hit",
+            "tests/tests/accel/kd.rs::caches_hold_the_top_of_the_tree_and_are_what_is_read",
         ],
         api: &["clerestory::accel::kd::KdCaches", "clerestory::accel::trace::RayTracer"],
         settings: &["clerestory::accel::trace::TraceSettings"],

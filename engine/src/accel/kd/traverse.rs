@@ -452,7 +452,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "engine/src/accel/kd/tests.rs::leaves_come_in_the_order_of_the_ray",
-            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            "tests/tests/accel/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[
             "clerestory::accel::kd::KdTraversal",
@@ -473,7 +473,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "engine/src/accel/kd/tests.rs::ways_as_long_as_the_word_of_flags_are_gone_to_their_end",
             "engine/src/accel/kd/tests.rs::a_hit_ends_a_ray_without_a_restart_for_each_far_child_that_is_left",
-            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            "tests/tests/accel/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[
             "clerestory::accel::kd::KdTraversal",
@@ -492,7 +492,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
-            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            "tests/tests/accel/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[
             "clerestory::accel::kd::KdTraversal",
@@ -511,7 +511,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/kd.glsl", "shaders/accel/trace_rays.comp"],
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
-            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            "tests/tests/accel/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[
             "clerestory::accel::kd::KdTraversal",
@@ -531,7 +531,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/accel/kd/tests.rs::every_scheme_returns_what_trying_all_triangles_returns",
             "engine/src/accel/kd/tests.rs::work_is_in_the_order_of_the_schemes",
-            "tests/tests/kd.rs::kernels_of_every_scheme_are_their_twins",
+            "tests/tests/accel/kd.rs::kernels_of_every_scheme_are_their_twins",
         ],
         api: &[
             "clerestory::accel::kd::KdTraversal",

@@ -289,7 +289,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/compact_bvh.glsl"],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::points_visit_the_same_leaves_in_the_same_order",
-            "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            "tests/tests/accel/lbvh.rs::compact_queries_are_the_twins",
         ],
         api: &["clerestory::accel::photon_map::compact_bvh::CompactBvh"],
         ..Row::of(file!())
@@ -303,7 +303,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/accel/compact_bvh.glsl"],
         tests: &[
             "engine/src/accel/photon_map/compact_bvh/tests.rs::rays_visit_the_same_leaves_in_the_same_order",
-            "tests/tests/lbvh.rs::compact_queries_are_the_twins",
+            "tests/tests/accel/lbvh.rs::compact_queries_are_the_twins",
         ],
         api: &["clerestory::accel::photon_map::compact_bvh::CompactBvh"],
         ..Row::of(file!())

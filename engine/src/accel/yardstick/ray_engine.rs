@@ -142,7 +142,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     limits: "Work is rays times triangles, and a pass for each triangle.",
     sources: &[CARR_2002.whole()],
     shaders: &["shaders/accel/ray_engine.comp"],
-    tests: &["tests/tests/ray_index.rs::the_ray_engine_finds_what_indexes_find"],
+    tests: &["tests/tests/accel/ray_index.rs::the_ray_engine_finds_what_indexes_find"],
     api: &["clerestory::accel::yardstick::ray_engine::RayEngine"],
     ..Row::of(file!())
 }];

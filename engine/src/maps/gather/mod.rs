@@ -79,8 +79,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/gather/tests/parts.rs::the_sky_is_far_and_does_not_draw_lights_away",
             "engine/src/maps/gather/tests/parts.rs::a_light_over_a_silhouette_lies_between",
             "engine/src/maps/gather/tests/parts.rs::bad_maps_and_settings_are_refused_by_name",
-            "tests/tests/gathers.rs::gathers_are_their_twins",
-            "tests/tests/gathers.rs::the_published_errors_hold_on_the_device",
+            "tests/tests/maps/gathers.rs::gathers_are_their_twins",
+            "tests/tests/maps/gathers.rs::the_published_errors_hold_on_the_device",
         ],
         api: &[
             "clerestory::maps::gather::Gather",
@@ -100,7 +100,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/maps/gather/tests/parts.rs::solid_angles_are_bounded_and_right_far_away",
             "engine/src/maps/gather/tests/errors.rs::gathers_err_as_published",
-            "tests/tests/gathers.rs::gathers_are_their_twins",
+            "tests/tests/maps/gathers.rs::gathers_are_their_twins",
             "tests/tests/twins/impostors.rs::discs_and_reflectivities_agree_with_their_twins",
         ],
         settings: &["clerestory::maps::gather::SolidAngleForm"],
@@ -130,7 +130,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/gather/tests/parts.rs::means_over_cones_are_the_published_ones",
             "engine/src/maps/gather/tests/parts.rs::narrow_lobes_keep_their_light_in_the_table",
             "engine/src/maps/gather/tests/errors.rs::cones_leave_no_spots_at_a_wall",
-            "tests/tests/gathers.rs::gathers_are_their_twins",
+            "tests/tests/maps/gathers.rs::gathers_are_their_twins",
             "tests/tests/twins/impostors.rs::discs_and_reflectivities_agree_with_their_twins",
         ],
         api: &["clerestory::maps::gather::Reflectivity"],
@@ -149,7 +149,7 @@ pub(crate) const ROWS: &[Row] = &[
         )),
         tests: &[
             "engine/src/maps/gather/tests/errors.rs::five_terms_keep_the_energy",
-            "tests/tests/gathers.rs::gathers_are_their_twins",
+            "tests/tests/maps/gathers.rs::gathers_are_their_twins",
         ],
         settings: &["clerestory::maps::gather::Terms"],
         ..Row::of(file!())

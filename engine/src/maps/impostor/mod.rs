@@ -94,11 +94,11 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/searches.rs::texels_with_normals_give_what_exact_rooms_do",
             "engine/src/maps/impostor/tests/searches.rs::texels_without_normals_are_off_by_less_than_a_texel",
             "engine/src/maps/impostor/tests/edges.rs::all_numbers_stay_finite",
-            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
-            "tests/tests/impostors.rs::every_map_agrees_with_its_twin_with_normals_and_without",
-            "tests/tests/impostors.rs::rays_that_are_none_find_nothing_in_the_kernel",
-            "tests/tests/impostors.rs::the_sky_is_seen_in_the_rays_own_direction",
-            "tests/tests/impostors.rs::what_cannot_be_searched_is_refused_by_name",
+            "tests/tests/maps/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
+            "tests/tests/maps/impostors.rs::every_map_agrees_with_its_twin_with_normals_and_without",
+            "tests/tests/maps/impostors.rs::rays_that_are_none_find_nothing_in_the_kernel",
+            "tests/tests/maps/impostors.rs::the_sky_is_seen_in_the_rays_own_direction",
+            "tests/tests/maps/impostors.rs::what_cannot_be_searched_is_refused_by_name",
         ],
         api: &[
             "clerestory::maps::impostor::Impostor",
@@ -119,7 +119,7 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
-            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
+            "tests/tests/maps/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -136,7 +136,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
             "engine/src/maps/impostor/tests/searches.rs::one_step_beats_the_classical_map_a_hundredfold",
             "engine/src/maps/impostor/tests/searches.rs::spherical_surroundings_give_the_published_distances",
-            "tests/tests/impostors.rs::convex_rooms_give_the_published_errors",
+            "tests/tests/maps/impostors.rs::convex_rooms_give_the_published_errors",
             "tests/tests/twins/impostors.rs::steps_and_planes_agree_with_their_twins",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
@@ -152,7 +152,7 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
-            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
+            "tests/tests/maps/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
             "tests/tests/twins/searches.rs::parts_of_searches_agree_with_their_twins",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
@@ -168,7 +168,7 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
-            "tests/tests/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
+            "tests/tests/maps/impostors.rs::every_method_agrees_with_its_twin_and_repeats_its_bits",
             "tests/tests/twins/searches.rs::searches_agree_with_their_twins",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
@@ -188,7 +188,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/searches.rs::a_moving_sphere_stays_below_a_degree",
             "engine/src/maps/impostor/tests/edges.rs::a_march_finds_the_first_hit_where_brackets_find_a_later_one",
             "engine/src/maps/impostor/tests/edges.rs::silhouettes_show_in_the_residual",
-            "tests/tests/impostors.rs::convex_rooms_give_the_published_errors",
+            "tests/tests/maps/impostors.rs::convex_rooms_give_the_published_errors",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -205,8 +205,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
             "engine/src/maps/impostor/tests/searches.rs::hidden_surfaces_give_the_published_errors",
             "engine/src/maps/impostor/tests/searches.rs::points_that_are_hidden_need_the_hybrid",
-            "tests/tests/impostors.rs::convex_rooms_give_the_published_errors",
-            "tests/tests/impostors.rs::hidden_points_need_the_hybrid",
+            "tests/tests/maps/impostors.rs::convex_rooms_give_the_published_errors",
+            "tests/tests/maps/impostors.rs::hidden_points_need_the_hybrid",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())
@@ -225,7 +225,7 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::refracted_rays_are_found_as_published",
-            "tests/tests/impostors.rs::refracted_rays_are_found_as_published",
+            "tests/tests/maps/impostors.rs::refracted_rays_are_found_as_published",
             "tests/tests/impostor_pictures/reflections.rs::glass_shows_what_the_path_tracer_shows_behind_one_interface",
             "engine/src/maps/impostor/tests/proxies.rs::all_light_is_reflected_where_none_is_refracted",
             "tests/tests/twins/impostors.rs::directions_agree_with_their_twins",
@@ -241,8 +241,8 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/maps/impostor_set.glsl", "shaders/maps/impostor_layouts.comp"],
         bias: None,
         tests: &[
-            "tests/tests/impostors.rs::distances_have_a_buffer_of_their_own",
-            "tests/tests/impostors.rs::layouts_show_the_same_radiance",
+            "tests/tests/maps/impostors.rs::distances_have_a_buffer_of_their_own",
+            "tests/tests/maps/impostors.rs::layouts_show_the_same_radiance",
             "engine/src/maps/impostor/tests/edges.rs::distances_are_never_averaged",
         ],
         api: &["clerestory::maps::impostor::layouts::ImpostorLayouts"],
@@ -258,7 +258,7 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(UNSEEN),
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::layers_hold_what_lies_behind",
-            "tests/tests/impostors.rs::three_layers_hold_what_lies_behind",
+            "tests/tests/maps/impostors.rs::three_layers_hold_what_lies_behind",
             "engine/src/maps/impostor/tests/edges.rs::the_sky_is_seen_in_the_rays_own_direction",
         ],
         ..Row::of(file!())
@@ -279,8 +279,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/searches.rs::the_first_crossing_errs_as_published",
             "engine/src/maps/impostor/tests/edges.rs::a_march_finds_the_first_hit_where_brackets_find_a_later_one",
             "engine/src/maps/impostor/tests/edges.rs::a_march_begins_in_front_of_coarse_texels",
-            "tests/tests/impostors.rs::three_layers_hold_what_lies_behind",
-            "tests/tests/impostors.rs::a_march_begins_in_front_of_coarse_texels",
+            "tests/tests/maps/impostors.rs::three_layers_hold_what_lies_behind",
+            "tests/tests/maps/impostors.rs::a_march_begins_in_front_of_coarse_texels",
         ],
         settings: &["clerestory::maps::impostor::SearchMethod"],
         ..Row::of(file!())

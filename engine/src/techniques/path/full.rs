@@ -110,9 +110,9 @@ pub(crate) const ROWS: &[Row] = &[Row {
     ],
     bias: Some(Bias::Unbiased),
     tests: &[
-        "tests/tests/full_waves.rs::pictures_are_those_of_whole_waves",
-        "tests/tests/full_waves.rs::passes_follow_from_segments_and_slots",
-        "tests/tests/full_waves.rs::what_has_ended_can_be_looked_at_and_more_be_asked_for",
+        "tests/tests/paths/full_waves.rs::pictures_are_those_of_whole_waves",
+        "tests/tests/paths/full_waves.rs::passes_follow_from_segments_and_slots",
+        "tests/tests/paths/full_waves.rs::what_has_ended_can_be_looked_at_and_more_be_asked_for",
         "tests/tests/embedding/walk.rs::walks_that_a_full_wave_cannot_take_are_refused",
         "tests/tests/media/mechanics.rs::how_the_work_is_cut_up_never_shows",
         "tests/tests/retries.rs::what_failed_is_done_again_without_a_trace",

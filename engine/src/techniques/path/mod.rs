@@ -540,10 +540,10 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(Bias::Unbiased),
         tests: &[
             "engine/src/transport/lights.rs::heuristics_sum_to_one",
-            "tests/tests/path_tracer.rs::lights_are_chosen_in_the_end_as_often_as_their_weights_say",
-            "tests/tests/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
-            "tests/tests/path_tracer.rs::the_variance_layer_is_the_variance_of_the_means",
-            "tests/tests/path_tracer.rs::sobol_draws_have_the_same_expectation_and_less_variance_between_seeds",
+            "tests/tests/paths/path_tracer.rs::lights_are_chosen_in_the_end_as_often_as_their_weights_say",
+            "tests/tests/paths/path_tracer.rs::closed_furnaces_have_the_radiance_of_the_geometric_series",
+            "tests/tests/paths/path_tracer.rs::the_variance_layer_is_the_variance_of_the_means",
+            "tests/tests/paths/path_tracer.rs::sobol_draws_have_the_same_expectation_and_less_variance_between_seeds",
         ],
         settings: &["roulette_start", "roulette_cap"],
         ..Row::of(file!())
@@ -572,10 +572,10 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/walk/extend.comp", "shaders/walk/shadow.comp"],
         bias: Some(Bias::Unbiased),
         tests: &[
-            "tests/tests/alpha.rs::masks_are_all_or_nothing",
-            "tests/tests/alpha.rs::blended_walls_thin_out_the_light_behind_them",
-            "tests/tests/alpha.rs::blended_surfaces_scatter_in_proportion_to_alpha",
-            "tests/tests/alpha.rs::textures_and_vertex_colours_carry_alpha",
+            "tests/tests/paths/alpha.rs::masks_are_all_or_nothing",
+            "tests/tests/paths/alpha.rs::blended_walls_thin_out_the_light_behind_them",
+            "tests/tests/paths/alpha.rs::blended_surfaces_scatter_in_proportion_to_alpha",
+            "tests/tests/paths/alpha.rs::textures_and_vertex_colours_carry_alpha",
         ],
         ..Row::of(file!())
     },
@@ -586,7 +586,7 @@ pub(crate) const ROWS: &[Row] = &[
         limits: "Solids of one absorption whose surfaces neither cross nor coincide.",
         sources: &[sources::KHRONOS_MATERIALS_VOLUME.at("law of Beer and Lambert")],
         shaders: &["shaders/techniques/path/path_shade.comp"],
-        tests: &["tests/tests/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
+        tests: &["tests/tests/paths/path_tracer.rs::light_inside_an_absorbing_body_is_absorbed_on_all_of_its_way"],
         ..Row::of(file!())
     },
 ];

@@ -218,7 +218,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/preview/reflections.rs::each_frame_is_drawn_anew",
         "tests/tests/preview/reflections.rs::tables_hold_the_means_of_boxes_of_the_frame",
         "tests/tests/preview/reflections.rs::sizes_that_cannot_be_are_refused",
-        "tests/tests/directional_maps.rs::latitude_longitude_maps_of_others_are_their_twins",
+        "tests/tests/maps/directional_maps.rs::latitude_longitude_maps_of_others_are_their_twins",
         "engine/src/maps/tests/places.rs::edges_are_straight_in_octants_and_bent_in_the_latitude_longitude_map",
         "engine/src/maps/tests/glossy.rs::boxes_near_the_poles_of_the_latitude_longitude_map_are_no_caps",
     ],

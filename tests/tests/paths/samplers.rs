@@ -4,7 +4,6 @@
 //! for a driver that was never seen before. Draws of one Sobol' pixel are stratified, so their counts are too even for the test; those are
 //! drawn one sample per pixel.
 
-#[path = "samplers/scattering.rs"]
 mod scattering;
 
 use std::f64::consts::{PI, TAU};

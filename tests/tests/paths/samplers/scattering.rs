@@ -18,7 +18,7 @@ use clerestory_tests::twin::Case;
 use clerestory_tests::{twin_kernel, with_gpu};
 use glam::{DVec3, Vec3};
 
-use crate::{DRAWS, pairs, turn, twin_math};
+use super::{DRAWS, pairs, turn, twin_math};
 
 twin_kernel!(twin_bsdf);
 

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// The part of the build script that is tested, with what it rests on.
-#[path = "../../engine/build"]
+#[path = "../../../engine/build"]
 mod build {
     pub mod compile;
     pub mod generate;

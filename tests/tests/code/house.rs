@@ -143,6 +143,37 @@ fn uses_are_found_in_all_their_forms() {
     assert_eq!(floors_included("#include \"film/a.glsl\"\n").len(), 1);
 }
 
+#[test]
+fn every_file_of_tests_is_part_of_a_program() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let mut left_out = Vec::new();
+    let mut seen = 0;
+    for path in files(&folder, &["rs"]) {
+        let below = path.strip_prefix(&folder).expect("below the folder");
+        let name = path.file_stem().expect("name").to_string_lossy();
+        // What lies in the folder itself cargo finds, as it does each folder's main.rs.
+        if below.components().count() == 1 || name == "main" {
+            continue;
+        }
+        seen += 1;
+        let parent = path.parent().expect("folder");
+        let declaring = [
+            parent.join("main.rs"),
+            parent.join("mod.rs"),
+            parent.with_extension("rs"),
+        ];
+        let source: String = declaring
+            .iter()
+            .filter_map(|file| std::fs::read_to_string(file).ok())
+            .collect();
+        if !source.lines().any(|line| line.trim() == format!("mod {name};")) {
+            left_out.push(below.display().to_string());
+        }
+    }
+    assert!(seen > 80, "{seen} files");
+    assert!(left_out.is_empty(), "in no program: {}", left_out.join(", "));
+}
+
 /// Ways to open a file that look neither at its kind nor at its length.
 const OTHER_DOORS: [&str; 5] = [
     "fs::read",

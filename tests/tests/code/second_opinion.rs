@@ -14,7 +14,7 @@ use clerestory::gpu::ash::vk;
 use clerestory::gpu::interface::ShaderInfo;
 use spirv_reflect::ffi;
 
-#[path = "../../engine/build/reflect.rs"]
+#[path = "../../../engine/build/reflect.rs"]
 mod reflect;
 
 use reflect::{Member, Resource, Type};

@@ -1,13 +1,9 @@
 //! The engine inside a host application: lent devices, a host's command buffers and buffers, several devices at once, several threads,
 //! techniques and kernels of the host's own.
 
-#[path = "embedding/commands.rs"]
 mod commands;
-#[path = "embedding/own_kernels.rs"]
 mod own_kernels;
-#[path = "embedding/technique.rs"]
 mod technique;
-#[path = "embedding/walk.rs"]
 mod walk;
 
 use std::ffi::{CStr, c_void};

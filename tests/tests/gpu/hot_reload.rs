@@ -33,7 +33,7 @@ fn save(path: &Path, text: &str, turn: u64) {
 
 #[test]
 fn a_changed_source_takes_effect_and_a_faulty_one_does_not() {
-    let original = include_str!("../shaders/out_of_bounds.comp");
+    let original = include_str!("../../shaders/out_of_bounds.comp");
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("out_of_bounds.comp");
     let elsewhere = tempfile::tempdir().unwrap();

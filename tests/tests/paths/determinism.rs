@@ -15,7 +15,7 @@ const SIZE: [u32; 2] = [24, 16];
 const SAMPLES: u32 = 12;
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_HASH";
-const CHILD_TEST: &str = "prints_its_hash_when_asked";
+const CHILD_TEST: &str = "determinism::prints_its_hash_when_asked";
 
 fn scene() -> Scene {
     builtin("builtin:cornell-box")

@@ -79,7 +79,7 @@ fn pictures_are_the_same_to_the_bit_with_every_index() {
             let mut first: Option<(Vec<u32>, f64)> = None;
             for name in IndexKind::NAMES {
                 let kind: IndexKind = name.parse().unwrap();
-                // The city's boxes are instances, which two levels keep, with vertices that are elsewhere by rounding (tests/tests/instances.rs).
+                // The city's boxes are instances, which two levels keep, with vertices that are elsewhere by rounding (tests/tests/accel/instances.rs).
                 if what == "city" && name == "two-level" {
                     continue;
                 }

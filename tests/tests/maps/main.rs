@@ -1,0 +1,5 @@
+//! Maps of directions, with distance and as lights.
+
+mod directional_maps;
+mod gathers;
+mod impostors;

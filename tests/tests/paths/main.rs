@@ -1,0 +1,18 @@
+//! The path tracer: its closed forms, its points, its sums and its settings, and technique `ambient`, which shares them.
+
+mod adaptive;
+mod alpha;
+mod ambient;
+mod automatic_choice;
+mod determinism;
+mod fetches;
+mod full_waves;
+mod many_lights;
+mod moving_lights;
+mod non_finite;
+mod path_sets;
+mod path_tracer;
+mod profile;
+mod samplers;
+mod scene_records;
+mod spectral_metals;
