@@ -1,8 +1,7 @@
-//! The path tracer: its closed forms, its points, its sums and its settings, and technique `ambient`, which shares them.
+//! The path tracer: its closed forms, its points, its sums and its settings.
 
 mod adaptive;
 mod alpha;
-mod ambient;
 mod automatic_choice;
 mod determinism;
 mod fetches;

@@ -21,7 +21,7 @@ const ROW: Row = Row {
     shaders: &["shaders/techniques/ambient/"],
     path_set: Some("bounces=0..1,lobes=diffuse+reflection+transmission"),
     bias: Some(Bias::Unbiased),
-    tests: &["tests/tests/paths/ambient.rs::pictures_are_the_path_tracers"],
+    tests: &["tests/tests/ambient.rs::pictures_are_the_path_tracers"],
     api: &["clerestory::techniques::ambient::Ambient"],
     ..Row::of(file!())
 };

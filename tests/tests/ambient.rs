@@ -313,7 +313,7 @@ fn adding_it_touched_its_folders_its_test_its_experiment_and_the_list() {
     let own = [
         "engine/src/techniques/ambient/",
         "shaders/techniques/ambient/",
-        "tests/tests/paths/ambient.rs",
+        "tests/tests/ambient.rs",
         "tools/experiments/ambient.toml",
     ];
     let mut files = Vec::new();
