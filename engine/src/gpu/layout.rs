@@ -308,7 +308,7 @@ impl<'a> ShaderModule<'a> {
     /// With the values of its constants written in where that can be done: then [`values`](Self::values) leaves none for the driver.
     pub fn specialized(gpu: &'a Inner, name: &str, spirv: &[u8], values: &[(u32, u32)]) -> Result<Self> {
         let words = words_of(name, spirv)?;
-        match specialize(&words, values) {
+        match specialize(name, &words, values) {
             Some(specialized) => Self::of_words(gpu, name, &specialized, true),
             None => Self::of_words(gpu, name, &words, false),
         }
