@@ -5,6 +5,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, BufferDesc, Category, Gpu, GpuOptions, Presented, Surface};
@@ -60,6 +61,16 @@ pub struct Shown {
     pub pixels: Buffer,
     /// Seconds of rendering.
     pub seconds: f64,
+}
+
+impl Shown {
+    /// Pixels whose rendering began then.
+    pub fn since(begin: Instant, pixels: &Buffer) -> Self {
+        Self {
+            pixels: pixels.clone(),
+            seconds: begin.elapsed().as_secs_f64(),
+        }
+    }
 }
 
 /// Memory for a frame of so many pixels, four bytes each.

@@ -178,7 +178,8 @@ pub fn random_words(gpu: &Gpu, kind: SamplerKind, table: &[RandomCase]) -> Vec<R
     gpu.read(output.view(), table.len()).unwrap()
 }
 
-/// Defines a function that runs a twin kernel: the generated sets and push constants of each shader are types of their own.
+/// Defines a function that runs a twin kernel: the generated sets and push constants of each shader are types of their own. With the word `specialized` the
+/// function takes the values of the kernel's specialization constants, too.
 #[macro_export]
 macro_rules! twin_kernel {
     ($name:ident) => {
@@ -188,11 +189,23 @@ macro_rules! twin_kernel {
             cases: &[$crate::twin::Case],
             table: &[f32],
         ) -> Vec<$crate::twin::Results> {
+            $crate::twin_kernel!($name, specialized);
+            $name(gpu, &(), function, cases, table)
+        }
+    };
+    ($name:ident, specialized) => {
+        fn $name(
+            gpu: &clerestory::gpu::Gpu,
+            spec: &<$crate::shaders::$name::Kernel as clerestory::gpu::interface::ComputeShader>::Spec,
+            function: u32,
+            cases: &[$crate::twin::Case],
+            table: &[f32],
+        ) -> Vec<$crate::twin::Results> {
             use $crate::shaders::$name as shader;
             let case_count = cases.len() as u32;
             $crate::twin::dispatch::<shader::Kernel>(
                 gpu,
-                &(),
+                spec,
                 cases,
                 table,
                 |pass, pipeline, [inputs, outputs, table]| {

@@ -301,14 +301,10 @@ pub(super) struct ShaderModule<'a> {
 }
 
 impl<'a> ShaderModule<'a> {
-    pub fn new(gpu: &'a Inner, name: &str, spirv: &[u8]) -> Result<Self> {
-        Self::of_words(gpu, name, &words_of(name, spirv)?, false)
-    }
-
     /// With the values of its constants written in where that can be done: then [`values`](Self::values) leaves none for the driver.
     pub fn specialized(gpu: &'a Inner, name: &str, spirv: &[u8], values: &[(u32, u32)]) -> Result<Self> {
         let words = words_of(name, spirv)?;
-        match specialize(&words, values) {
+        match specialize(name, &words, values) {
             Some(specialized) => Self::of_words(gpu, name, &specialized, true),
             None => Self::of_words(gpu, name, &words, false),
         }

@@ -181,11 +181,10 @@ impl Show for ManyLights {
         view.samples += 1;
         while view.renderer.step(view.samples)?.is_some() {}
         view.renderer.display(&view.pixels, self.exposure, self.format)?;
-        let pixels = view.pixels.clone();
+        let shown = Shown::since(begin, &view.pixels);
         self.view = Some(view);
-        let seconds = begin.elapsed().as_secs_f64();
-        self.untold = (self.untold.0 + seconds, self.untold.1 + 1);
-        Ok(Shown { pixels, seconds })
+        self.untold = (self.untold.0 + shown.seconds, self.untold.1 + 1);
+        Ok(shown)
     }
 
     fn title(&mut self) -> String {

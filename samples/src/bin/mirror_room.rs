@@ -257,21 +257,18 @@ impl Show for Mirrors {
         }
         view.samples += 1;
         while view.mirrors.step(view.samples)?.is_some() {}
-        let shown = match self.shows {
+        let sheet = match self.shows {
             Shows::Picture => None,
             Shows::Difference => Some(self.difference(&mut view, orbit)?),
             Shows::Residual => Some(self.residual(&mut view, orbit)?),
         };
-        match shown {
+        match sheet {
             Some(sheet) => self.gpu.upload(&view.pixels, 0, &sheet.bytes(self.format))?,
             None => view.mirrors.display(&view.pixels, self.exposure, self.format)?,
         }
-        let pixels = view.pixels.clone();
+        let shown = Shown::since(begin, &view.pixels);
         self.view = Some(view);
-        Ok(Shown {
-            pixels,
-            seconds: begin.elapsed().as_secs_f64(),
-        })
+        Ok(shown)
     }
 
     fn title(&mut self) -> String {

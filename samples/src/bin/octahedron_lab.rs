@@ -489,10 +489,7 @@ impl Show for Lab {
         let begin = Instant::now();
         let bytes = self.next(size)?.bytes(self.format);
         let pixels = self.gpu.buffer_with("shown pixels", Category::Film, &bytes)?;
-        Ok(Shown {
-            pixels,
-            seconds: begin.elapsed().as_secs_f64(),
-        })
+        Ok(Shown::since(begin, &pixels))
     }
 
     fn title(&mut self) -> String {

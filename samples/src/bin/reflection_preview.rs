@@ -394,12 +394,9 @@ impl Show for Stage {
             *self.times.entry(pass.name).or_default() += 1e-6 * pass.nanoseconds.unwrap_or_default() as f64;
         }
         self.frames += 1;
-        let pixels = view.pixels.clone();
+        let shown = Shown::since(begin, &view.pixels);
         self.view = Some(view);
-        Ok(Shown {
-            pixels,
-            seconds: begin.elapsed().as_secs_f64(),
-        })
+        Ok(shown)
     }
 
     fn title(&mut self) -> String {

@@ -11,6 +11,7 @@ const SCALE: &str = "
 struct Push { factor: u32, count: u32 }
 var<immediate> push: Push;
 override BIAS: u32 = 3;
+override IS_SUMMED: bool = true;
 @group(0) @binding(0) var<storage, read> numbers: array<u32>;
 @group(0) @binding(1) var<storage, read_write> results: array<u32>;
 @group(1) @binding(2) var<uniform> shift: vec4u;
@@ -22,7 +23,11 @@ fn scale(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
     shared_words[lane] = push.factor * numbers[id.x] + shift.y + BIAS;
     workgroupBarrier();
     if id.x < push.count {
-        results[id.x] = shared_words[lane] + shared_words[lane ^ 1u];
+        if IS_SUMMED {
+            results[id.x] = shared_words[lane] + shared_words[lane ^ 1u];
+        } else {
+            results[id.x] = numbers[id.x];
+        }
     }
 }
 ";

@@ -5,12 +5,14 @@ use clerestory::maps::impostor::{
     ImpostorHit, ImpostorImage, ImpostorRay, ImpostorScene, ImpostorSettings, SearchMethod, impostor_by_march,
     impostor_by_steps, impostor_ratio, impostor_search,
 };
-use clerestory_tests::shaders::twin_search as shader;
-use clerestory_tests::twin::{Case, Results, Tolerance, compare, dispatch};
-use clerestory_tests::with_gpu;
+use clerestory_tests::shaders::twin_search::Spec;
+use clerestory_tests::twin::{Case, Results, Tolerance, compare};
+use clerestory_tests::{twin_kernel, with_gpu};
 use glam::{DVec3, Vec3};
 
 use crate::{cases, direction, join, ulps, v3};
+
+twin_kernel!(twin_search, specialized);
 
 /// Half widths of the layers' boxes.
 const BOXES: [f32; 2] = [1.0, 1.6];
@@ -76,22 +78,13 @@ fn settings(method: SearchMethod) -> ImpostorSettings {
 
 fn run(gpu: &Gpu, method: SearchMethod, function: u32, table: &[Case]) -> Vec<Results> {
     let of = settings(method);
-    let spec = shader::Spec {
+    let spec = Spec {
         impostor_method: method.number(),
         impostor_steps: of.steps,
         impostor_bisections: of.bisections,
         impostor_layers: LAYERS,
     };
-    let case_count = table.len() as u32;
-    dispatch::<shader::Kernel>(gpu, &spec, table, &BOXES, |pass, pipeline, [inputs, outputs, table]| {
-        let set = shader::Set0 {
-            twin_inputs: inputs,
-            twin_outputs: outputs,
-            twin_table: table,
-        };
-        let push = shader::Push { function, case_count };
-        pass.dispatch(pipeline, &[&set], &push, [pipeline.groups_for(case_count), 1, 1])
-    })
+    twin_search(gpu, &spec, function, table, &BOXES)
 }
 
 /// Lengths of the size of the room; rounding of a guess enters the next one, by secants of any slope.

@@ -214,7 +214,8 @@ impl OwnKernel {
                 attachments: 0,
             },
         )?;
-        let shader = ShaderModule::new(inner, name, &module.spirv)?;
+        // Constants of the source have the values that it gives them.
+        let shader = ShaderModule::specialized(inner, name, &module.spirv, &[])?;
         let entry = CString::new(module.entry.as_str()).map_err(|_| Error::KernelSource {
             kernel: name.into(),
             line: 0,
