@@ -226,7 +226,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::refracted_rays_are_found_as_published",
             "tests/tests/impostors.rs::refracted_rays_are_found_as_published",
-            "tests/tests/impostor_pictures/reflections.rs::glass_shows_what_the_path_tracer_shows_behind_one_interface",
+            "tests/tests/impostor_pictures/refractions.rs::glass_shows_what_the_path_tracer_shows_behind_one_interface",
             "engine/src/maps/impostor/tests/proxies.rs::all_light_is_reflected_where_none_is_refracted",
             "tests/tests/twins/impostors.rs::directions_agree_with_their_twins",
         ],

@@ -17,10 +17,10 @@
 //! - What the map's place does not see is not there: reflections stick to the edges of what hides it. With further layers of surfaces, which a map by rays has, that is what lies behind more surfaces than these.
 //! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same.
 //! - Searches end beside surfaces: by how much, [`ImpostorReflections::counts`] and [`LookUp::residual`] say.
-//! - Radiance at texels' middles is joined bilinearly; with a capture by rays its noise stays, and is the same for all seeds.
+//! - Radiance at texels' middles is joined bilinearly, so that borders of shadows are up to half a texel off; with a capture by rays its noise stays, and is the same for all seeds.
 //! - A surface that is smooth by a texture alone is not taken for one that reflects: it is in the map, and without others there is none.
 //! - Bodies that reflect do not show in reflections, their own included.
-//! - A rasterized map has the shadows of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), none of directional lights, and draws partial alpha opaque.
+//! - A rasterized map has the shadows, and their borders, of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), none of directional lights, and draws partial alpha opaque.
 //!
 //! In the limit of many texels and steps, what convex rooms of diffuse walls show in a convex mirror is exact.
 //!
