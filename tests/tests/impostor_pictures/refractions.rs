@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::*;
 use clerestory::film::Picture;
 use clerestory::techniques::impostors::{CaptureBy, ImpostorReflections, ReflectionMethod, ReflectionSettings};
-use clerestory::transport::GpuScene;
 use clerestory::transport::random::SamplerKind;
+use clerestory::transport::{GpuScene, PathSet};
 
 const SIZE: u32 = 24;
 const SAMPLES: u32 = 256;
@@ -138,5 +138,110 @@ fn glass_shows_what_the_path_tracer_shows_behind_one_interface() {
         };
         let [without, _] = of(&border, "border, without distances", classical);
         assert!(without > 10.0 * coarse, "{without} {coarse}");
+    });
+}
+
+/// A pane of thin glass before the lamp's half of the room, by the card's setting: what lies behind it, and what it mirrors.
+#[test]
+fn a_pane_shows_what_lies_behind_it() {
+    with_gpu(|gpu| {
+        let scene = panes(&[0.4]);
+        let renderer = renderer(gpu, &scene);
+        let found = rendered(
+            &renderer,
+            "impostor",
+            SIZE,
+            SAMPLES,
+            json!({"refracts": true, "capture": "rays", "side": 512, "capture_samples": 1, "steps": 8, "sampler": "pcg"}),
+        );
+        let expected = traced(&renderer, &found, SIZE, 1024);
+        assert_eq!(found.report.path_set, PathSet::DIRECT_AND_MIRRORED.to_string());
+        let all: Vec<usize> = (0..(SIZE * SIZE) as usize).collect();
+        let [off, bias] = errors_beyond_noise(&found, &expected, &all);
+        println!("a pane: {off:.4}, bias {bias:+.4}");
+        assert!(off < 0.03 && bias.abs() < 0.01, "{off} {bias}");
+        // Two rays from each place.
+        assert_eq!(
+            found.report.counters["reflections"],
+            u64::from(2 * SAMPLES * SIZE * SIZE)
+        );
+    });
+}
+
+/// The room with a lamp behind panes of thin glass across the view, at places along x.
+fn panes(at: &[f32]) -> Scene {
+    let mut scene = Scene {
+        name: "panes".into(),
+        ..Scene::default()
+    };
+    walls(&mut scene, 1.0);
+    scene.add_light(
+        "lamp",
+        LightKind::Point {
+            position: BEYOND,
+            intensity: Vec3::new(1.0, 0.9, 0.8),
+        },
+    );
+    let glass = scene.add_material(Material {
+        thickness: 0.0,
+        ..Material::glass("pane", 1.5)
+    });
+    for x in at {
+        let corner = |y: f32, z: f32| Vec3::new(*x, y, z);
+        let corners = [
+            corner(-0.8, -0.8),
+            corner(0.8, -0.8),
+            corner(0.8, 0.8),
+            corner(-0.8, 0.8),
+        ];
+        scene.place(quad("pane", glass, corners));
+    }
+    scene
+        .cameras
+        .push(Camera::look_at("main", EYE, DVec3::X, DVec3::Y, 0.4));
+    scene
+}
+
+/// Bodies, and panes one behind the other: the first sample's refracted rays tell. Through one pane and past the other there is nothing to refuse.
+#[test]
+fn second_interfaces_are_refused() {
+    with_gpu(|gpu| {
+        let refused = |scene: &Scene, technique: &str, settings: Value| {
+            let options = RenderOptions {
+                technique: Some(technique.into()),
+                size: [SIZE; 2],
+                spp: 2,
+                settings: settings.into(),
+                ..RenderOptions::default()
+            };
+            let error = renderer(gpu, scene).render(&options).err();
+            error
+                .unwrap_or_else(|| panic!("{technique}: {}", scene.name))
+                .to_string()
+        };
+        let mut body = room_with(Material::glass("glass", 1.5), B, RADIUS, EYE, 1.2, 1.0);
+        lamp(&mut body, 1.0);
+        let refracts = || json!({"refracts": true, "side": 64});
+        for scene in [&body, &panes(&[0.4, 0.6])] {
+            let error = refused(scene, "impostor", refracts());
+            assert!(error.contains("refracted rays meet a second interface"), "{error}");
+            let error = refused(scene, "impostor", Value::Null);
+            assert!(error.contains("without the setting `refracts`"), "{error}");
+            // What has no such setting names none.
+            let error = refused(scene, "localized-gather", Value::Null);
+            assert!(
+                error.contains("surfaces transmit light") && !error.contains("`refracts`"),
+                "{error}"
+            );
+        }
+        let error = refused(
+            &clerestory_tests::render::builtin("builtin:fog-box"),
+            "impostor",
+            refracts(),
+        );
+        assert!(error.contains("participating media"), "{error}");
+        // One pane alone, though the other is in the scene: it is in the map, as what reflects nothing.
+        let settings = json!({"refracts": true, "side": 64, "reflector": 6, "capture": "rays"});
+        rendered(&renderer(gpu, &panes(&[0.4, 0.6])), "impostor", SIZE, 2, settings);
     });
 }

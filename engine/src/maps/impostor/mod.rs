@@ -215,7 +215,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-D8",
         name: "refracted rays by the same searches",
         role: Role::PartOf("MET-D1"),
-        limits: "One interface; a ray ends on what lies beyond the body as if it had no other side.",
+        limits: "One interface: a ray ends on what lies beyond the body as if it had no other side, and technique `impostor` refuses pictures in which it has one.",
         sources: &[sources::SZIRMAY_KALOS_2005.whole()],
         shaders: &[
             "shaders/maps/proxy.glsl",
