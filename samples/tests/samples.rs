@@ -660,6 +660,21 @@ fn the_reflection_preview_shows_its_room_and_a_body_that_moves() {
     assert!((mean(&later, [0.0, 0.12], [0.3, 0.5])[0] - left[0]).abs() < 3.0);
 }
 
+/// With a search in the map's distances the sphere shows its room otherwise, and all else is the same; without there is no such pass.
+#[test]
+fn the_reflection_preview_searches_where_it_is_told_to() {
+    let [(plain, without), (searched, with)] =
+        [&["--shape", "sphere"][..], &["--shape", "sphere", "--search", "3"]].map(reflection_preview);
+    assert!(
+        with.contains("preview: search") && !without.contains("preview: search"),
+        "{with}"
+    );
+    let changed = differing(&plain, &searched, 8);
+    assert!((20..3000).contains(&changed), "{changed} pixels");
+    let wall = |picture: &image::RgbImage| mean(picture, [0.0, 0.12], [0.3, 0.5]);
+    assert_eq!(wall(&plain), wall(&searched));
+}
+
 #[test]
 fn the_reflection_previews_layouts_of_shadows_agree() {
     let of = |shadows: &str| reflection_preview(&["--shape", "sphere", "--shadows", shadows]).0;
@@ -700,6 +715,7 @@ fn the_reflection_preview_refuses_what_it_cannot_show() {
         (&["--roughness", "2"], "from 0 to 1"),
         (&["--shadows", "paraboloid"], "paraboloid"),
         (&["--map", "100"], "--map: 100 is not a power of two"),
+        (&["--search", "300"], "--search: 300 is not in 0..=256"),
         (&["--samples", "0"], "--samples: 0 is not from 1 to 8"),
         (&["--shadow", "0"], "--shadow: "),
         (&["--radius", "0"], "--radius: 0"),

@@ -16,6 +16,8 @@ pub struct ObjectTriangles {
     pub triangles: Range<u32>,
     /// Its material's factors, whatever its textures, make it a mirror, or give it a smooth layer that mirrors in part.
     pub mirrors: bool,
+    /// They let light through that smooth surface.
+    pub transmits: bool,
 }
 
 /// What of a scene its pixels depend on: what is absent is compiled out.

@@ -79,6 +79,7 @@ pub struct SettingsDecl {
     infos: fn() -> Vec<SettingInfo>,
     defaults: fn() -> Value,
     check: fn(&Settings) -> Result<()>,
+    lifts: fn(&Settings, &str) -> bool,
 }
 
 impl SettingsDecl {
@@ -91,7 +92,18 @@ impl SettingsDecl {
             infos: T::infos,
             defaults: || T::default().to_json(),
             check: |settings| settings.read::<T>().map(|_| ()),
+            lifts: |_, _| false,
         }
+    }
+
+    /// The same where some settings take refusals back: `lifts` says whether settings do so with a reason of [`Card::refusals`](crate::techniques::Card::refusals).
+    pub const fn lifting(self, lifts: fn(&Settings, &str) -> bool) -> Self {
+        Self { lifts, ..self }
+    }
+
+    /// Whether settings take a refusal back.
+    pub fn lifts(&self, settings: &Settings, reason: &str) -> bool {
+        (self.lifts)(settings, reason)
     }
 
     /// What each setting means, in the order to explain them in.

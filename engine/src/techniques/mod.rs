@@ -120,7 +120,7 @@ pub struct Card {
     pub kernels: &'static [&'static [&'static ShaderInfo]],
     /// The light paths of its picture with default settings; a setting `path_set` may restrict them to a part.
     pub path_set: PathSet,
-    /// Why it cannot model a scene; empty when it can.
+    /// Why it cannot model a scene with default settings; empty when it can. Others may take reasons back ([`SettingsDecl::lifting`]).
     pub refusals: fn(&SceneProfile) -> Vec<String>,
     /// Its settings, as [`settings!`](crate::settings!) declares them.
     pub settings: SettingsDecl,
@@ -270,7 +270,9 @@ impl Card {
     /// Refuses what [`Card::prepare`] refuses before anything is made. Returns the settings for [`Card::create`].
     pub(crate) fn admit(&self, caps: &Caps, profile: &SceneProfile, settings: &Settings) -> Result<Settings> {
         device_needs::check(caps, self)?;
+        let own = self.without_path_set(settings);
         let mut reasons = (self.refusals)(profile);
+        reasons.retain(|reason| !self.settings.lifts(&own, reason));
         reasons.extend(self.path_set_refusal(settings));
         if !reasons.is_empty() {
             return Err(Error::Unsupported {
@@ -278,9 +280,8 @@ impl Card {
                 reasons,
             });
         }
-        let settings = self.without_path_set(settings);
-        self.settings.check_given(&settings)?;
-        Ok(settings)
+        self.settings.check_given(&own)?;
+        Ok(own)
     }
 
     /// The light paths of its pictures with these settings, as far as a path set among them can be read.

@@ -1,12 +1,12 @@
 //! A polished body that turns and wanders through a room and reflects it, drawn by rasterization alone.
 //!
 //! `reflection_preview [SCENE] [--shape sphere|ring|knot] [--metal mirror|NAME] [--roughness NUMBER] [--radius METRES] [--turn DEGREES]
-//! [--map TEXELS] [--shadows cube|octahedron|none] [--shadow TEXELS] [--samples N] [--output FILE] [--camera NAME]
+//! [--map TEXELS] [--search STEPS] [--shadows cube|octahedron|none] [--shadow TEXELS] [--samples N] [--output FILE] [--camera NAME]
 //! [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--screenshot FILE]`
 //!
 //! Each frame the body goes on by `--turn` degrees of its way. Lights without area cast shadows by omnidirectional shadow maps (`--shadow` texels
 //! along a side); the scene without the body is drawn in all directions from the body's middle, into an octahedron map of `--map` texels per side, and
-//! the body shows that map, filtered by how rough it is. What walls throw on one another is a second such map, drawn three times at the start, each lit by the one before.
+//! the body shows that map, filtered by how rough it is: in the direction of the mirrored ray, or with `--search` where so many steps through the map's distances find what that ray meets. What walls throw on one another is a second such map, drawn three times at the start, each lit by the one before.
 //! `--samples` squared samples make a pixel. Metals are gold, silver, copper, aluminium, iron, chromium, titanium, nickel and cobalt. Space holds the
 //! body. With `--output` there is no window: the last of `--frames` frames is written, and how long its parts took. Without a scene it is a room with two
 //! lamps. Otherwise as the viewer.
@@ -18,9 +18,12 @@ use std::time::Instant;
 
 use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, Gpu, GpuOptions, Recorder};
+use clerestory::maps::impostor::ImpostorSettings;
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{self, LightKind, Material, Mesh, Scene, SceneProfile, metals};
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows};
+use clerestory::techniques::preview::{
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows, SearchedReflections,
+};
 use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
 use clerestory_samples::arguments::Arguments;
@@ -58,6 +61,7 @@ fn run() -> Result<()> {
         "--radius",
         "--turn",
         "--map",
+        "--search",
         "--shadows",
         "--shadow",
         "--samples",
@@ -112,6 +116,8 @@ struct Settings {
     /// Radians a frame.
     turn: f64,
     map: u32,
+    /// In the map's distances; `None` for the mirrored ray's own direction.
+    search: Option<ImpostorSettings>,
     shadows: Option<PreviewShadows>,
     samples: u32,
 }
@@ -142,6 +148,10 @@ impl Settings {
             radius,
             turn: given.value("--turn")?.unwrap_or(TURN).to_radians(),
             map: given.value("--map")?.unwrap_or(256),
+            search: given.value("--search")?.map(|steps| ImpostorSettings {
+                steps,
+                ..ImpostorSettings::default()
+            }),
             shadows: layout.map(|layout| PreviewShadows {
                 layout,
                 side,
@@ -242,6 +252,7 @@ fn by_option(mut error: Error) -> Error {
             "probe side" | "directional map: texels" => "--map",
             "shadow maps" | "shadow width" => "--shadow",
             "samples" | "preview: samples" => "--samples",
+            "impostor steps" => "--search",
             _ => return error,
         };
         *name = option.into();
@@ -274,6 +285,8 @@ struct View {
     walls: [LiveProbe; 2],
     /// What the body sees.
     around: LiveProbe,
+    /// Where that is searched.
+    searched: Option<SearchedReflections>,
     pixels: Buffer,
     size: [u32; 2],
 }
@@ -320,7 +333,18 @@ impl Stage {
         .map_err(by_option)?;
         let probe = |side, finest| LiveProbe::new(gpu, scene, &preview, LightProbeDesc { side, finest }, true);
         let walls = [probe(WALLS, 64)?, probe(WALLS, 64)?];
-        let around = probe(self.settings.map, 128).map_err(by_option)?;
+        let desc = LightProbeDesc {
+            side: self.settings.map,
+            finest: 128,
+        };
+        let make = match self.settings.search {
+            Some(_) => LiveProbe::with_distances,
+            None => LiveProbe::new,
+        };
+        let around = make(gpu, scene, &preview, desc, true).map_err(by_option)?;
+        let search = self.settings.search.as_ref();
+        let searched = search.map(|search| SearchedReflections::new(gpu, scene, around.probe(), search));
+        let searched = searched.transpose().map_err(by_option)?;
         let surfaces = scene.surfaces();
         let bare = surfaces.before(self.body.object);
         let mut recorder = gpu.recorder("light among the walls")?;
@@ -335,6 +359,7 @@ impl Stage {
             preview,
             walls,
             around,
+            searched,
             pixels: window::pixels(gpu, size)?,
             size,
         })
@@ -357,13 +382,16 @@ impl Stage {
                 probe: Some(walls),
             },
             PreviewPart {
-                triangles: object,
+                triangles: object.clone(),
                 background: false,
                 probe: Some(view.around.probe()),
             },
         ];
-        view.preview
-            .record(recorder, scene, &surfaces, &orbit.camera(), &parts)?;
+        let camera = orbit.camera();
+        view.preview.record(recorder, scene, &surfaces, &camera, &parts)?;
+        if let Some(searched) = &view.searched {
+            searched.record(recorder, scene, &view.preview, &camera, object, (&view.around, place))?;
+        }
         view.preview
             .record_display(recorder, &view.pixels, self.exposure, self.format)
     }

@@ -12,6 +12,7 @@ layout(local_size_x = 64) in;
 #include "transport/features.glsl"
 #include "walk/wave.glsl"
 #include "maps/impostor_set.glsl"
+#include "techniques/impostors/reflection_record.glsl"
 #include "transport/arrival.glsl"
 #include "transport/path_set.glsl"
 
@@ -28,15 +29,6 @@ layout(push_constant, scalar) uniform Push {
     float tolerance;      // residual of what counts as found
     uint side;            // texels across and down
 } push;
-
-// A reflected ray from the map's place, and where it was looked up.
-struct ReflectionRecord {
-    vec3 origin;
-    float residual;
-    vec3 direction;
-    uint is_used;
-    vec3 found;
-};
 
 // Octahedron of directions, row by row without a border; layer of surfaces by layer.
 layout(set = 3, binding = 0, scalar) restrict readonly buffer MapRadiance { vec3 map_radiance[]; };
@@ -83,8 +75,9 @@ ImpostorHit reflected_hit(vec3 x, vec3 r) {
     return impostor_search(x, r, extent, push.tolerance);
 }
 
-// Adds what lies along the ray of a lobe, where it has one.
-void follow(uint slot, WalkState path, Arrival a, ScatteringFrame frame, uint lobe) {
+// Adds what lies along the mirrored or the refracted ray, where there is one.
+void follow(uint slot, WalkState path, Arrival a, ScatteringFrame frame, uint kind) {
+    uint lobe = LOBE_SPECULAR & (kind == REFLECTION_REFRACTED ? LOBE_TRANSMISSION : LOBE_REFLECTION);
     // One lobe alone: no number chooses.
     BsdfSample mirror = bsdf_sample(a.bsdf, frame.wo, vec3(0.5), lobe);
     vec3 r = normalize(frame_to_world(frame, mirror.wi));
@@ -105,7 +98,7 @@ void follow(uint slot, WalkState path, Arrival a, ScatteringFrame frame, uint lo
         atomicAdd(reflection_counters.unfound, 1u);
     }
     if (KEEPS_LOOK_UPS) {
-        reflection_records[slot] = ReflectionRecord(x, found.residual, r, 1u, found.direction);
+        reflection_records[slot] = ReflectionRecord(x, found.residual, r, kind, found.direction);
     }
 }
 
@@ -121,9 +114,9 @@ void reflect_at(uint slot, uint place) {
         return;
     }
     ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
-    follow(slot, path, a, frame, LOBE_SPECULAR & LOBE_REFLECTION);
+    follow(slot, path, a, frame, REFLECTION_MIRRORED);
     if (REFRACTS) {
-        follow(slot, path, a, frame, LOBE_SPECULAR & LOBE_TRANSMISSION);
+        follow(slot, path, a, frame, REFLECTION_REFRACTED);
     }
 }
 

@@ -5,6 +5,7 @@
 mod edge_cases;
 mod gathers;
 mod reflections;
+mod refractions;
 
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Rendered, Renderer};

@@ -3,14 +3,12 @@
 use std::sync::Arc;
 
 use super::*;
-use clerestory::film::Picture;
 use clerestory::film::z_test::{SIGNIFICANCE, z_test};
 use clerestory::maps::impostor::ImpostorRay;
 use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
 use clerestory::scene::Environment;
 use clerestory::techniques::impostors::{ImpostorReflections, LookUp, ReflectionMethod, ReflectionSettings};
 use clerestory::transport::GpuScene;
-use clerestory::transport::random::SamplerKind;
 use clerestory_tests::render::cuboid;
 
 const RADIUS: f64 = 0.3;
@@ -62,76 +60,6 @@ fn mirrors_in_a_diffuse_room_show_what_the_path_tracer_shows() {
             counters["reflections_unfound"] * 50 < counters["reflections"],
             "{counters:?}"
         );
-    });
-}
-
-/// The half of a glass sphere that the eye sees, so that the path tracer meets one interface, too.
-#[test]
-fn glass_shows_what_the_path_tracer_shows_behind_one_interface() {
-    with_gpu(|gpu| {
-        const SIZE: u32 = 24;
-        const SAMPLES: u32 = 256;
-        let mut scene = room_with(Material::glass("glass", 1.5), B, RADIUS, EYE, 1.2, 1.0);
-        lamp(&mut scene, 1.0);
-        let shell = &mut scene.meshes[SPHERE as usize];
-        let towards = (EYE - B).as_vec3();
-        let positions = shell.positions.clone();
-        let is_seen = |corners: &[u32; 3]| {
-            let sum: Vec3 = corners.iter().map(|corner| positions[*corner as usize]).sum();
-            (sum / 3.0 - B.as_vec3()).dot(towards) > 0.0
-        };
-        shell.triangles.retain(is_seen);
-        let on = pixels_of_sphere(&scene, SIZE, B, RADIUS, true);
-        assert!(on.len() > 150, "{}", on.len());
-        let on_device = Arc::new(GpuScene::new(gpu, &scene).unwrap());
-        let refracted = |method: ReflectionMethod, refracts: bool| {
-            let settings = ReflectionSettings {
-                place: Some([0.1, -0.05, 0.1]),
-                method,
-                steps: 8,
-                side: 512,
-                capture_samples: 1,
-                sampler: SamplerKind::Pcg,
-                refracts,
-                ..ReflectionSettings::default()
-            };
-            ImpostorReflections::new(gpu, on_device.clone(), &scene.cameras[0], [SIZE; 2], settings)
-        };
-        let error = refracted(ReflectionMethod::Hybrid, false).map(|_| ()).unwrap_err();
-        assert!(error.to_string().contains("surfaces transmit light"), "{error}");
-        let picture = |method: ReflectionMethod| {
-            let mut technique = refracted(method, true).unwrap();
-            while technique.step(SAMPLES).unwrap().is_some() {}
-            let (picture, non_finite) = technique.picture().unwrap();
-            assert_eq!(non_finite.total(), 0);
-            // Two rays from each place of the glass: none of an eye's ray is beyond the critical angle.
-            assert!(technique.counts().reflections > 2 * u64::from(SAMPLES) * on.len() as u64);
-            (picture, technique.path_set())
-        };
-        let (found, paths) = picture(ReflectionMethod::Hybrid);
-        let (without, _) = picture(ReflectionMethod::Classical);
-        let renderer = renderer(gpu, &scene);
-        let settings = json!({"path_set": paths.to_string(), "sampler": "pcg"});
-        let expected = rendered_by(&renderer, "path", (SIZE, 2048), 6, settings);
-        let values = |picture: &Picture, name: &str| picture.layer(name).unwrap().values().to_vec();
-        let mean = |values: &[f32]| {
-            let of = on.iter().flat_map(|pixel| values[3 * pixel..3 * pixel + 3].to_vec());
-            of.map(f64::from).sum::<f64>() / (3 * on.len()) as f64
-        };
-        // Without what the variances of independent samples explain.
-        let off = |found: &Picture| {
-            let radiance = values(&expected.picture, "radiance");
-            let [rms, bias] = super::errors(&values(found, "radiance"), &radiance, &on);
-            let noise = mean(&values(found, "variance")) + mean(&values(&expected.picture, "variance"));
-            let left = (rms * rms - noise / mean(&radiance).powi(2)).max(0.0).sqrt();
-            println!("glass: RMS {rms:.4}, {left:.4} beyond noise, {bias:+.4}");
-            [left, bias]
-        };
-        let [searched, bias] = off(&found);
-        let [looked_up, _] = off(&without);
-        // Three times what a mirror in this room errs by: much of what is seen through the glass lies in its own shadow, whose borders a drawn map has a texel wide.
-        assert!(searched < 0.08 && bias.abs() < 0.015, "{searched} {bias}");
-        assert!(looked_up > 10.0 * searched, "{looked_up} {searched}");
     });
 }
 

@@ -7,6 +7,7 @@ mod moving;
 mod penumbra;
 mod planar;
 mod reflections;
+mod search;
 mod shadows;
 mod subject;
 mod technique;

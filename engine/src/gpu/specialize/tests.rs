@@ -290,7 +290,7 @@ fn choices(words: &[u32], random: &mut Random) -> [Vec<(u32, u32)>; 2] {
     [off, mixture]
 }
 
-/// What `spirv-val` says of a module, with the options of `tests/tests/shaders.rs`; an error where it cannot be run.
+/// What `spirv-val` says of a module, with the options of `tests/tests/code/shaders.rs`; an error where it cannot be run.
 fn validate(module: &[u32]) -> std::io::Result<Result<(), String>> {
     let mut child = Command::new("spirv-val")
         .args(["--target-env", "vulkan1.1", "--scalar-block-layout", "-"])

@@ -215,7 +215,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-D8",
         name: "refracted rays by the same searches",
         role: Role::PartOf("MET-D1"),
-        limits: "One interface; a ray ends on what lies beyond the body as if it had no other side.",
+        limits: "One interface: a ray ends on what lies beyond the body as if it had no other side, and technique `impostor` refuses pictures in which it has one.",
         sources: &[sources::SZIRMAY_KALOS_2005.whole()],
         shaders: &[
             "shaders/maps/proxy.glsl",
@@ -226,7 +226,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/maps/impostor/tests/searches.rs::refracted_rays_are_found_as_published",
             "tests/tests/maps/impostors.rs::refracted_rays_are_found_as_published",
-            "tests/tests/impostor_pictures/reflections.rs::glass_shows_what_the_path_tracer_shows_behind_one_interface",
+            "tests/tests/impostor_pictures/refractions.rs::glass_shows_what_the_path_tracer_shows_behind_one_interface",
             "engine/src/maps/impostor/tests/proxies.rs::all_light_is_reflected_where_none_is_refracted",
             "tests/tests/twins/impostors.rs::directions_agree_with_their_twins",
         ],

@@ -378,6 +378,12 @@ fn paths(gpu: &Gpu, scene: &Arc<GpuScene>, plan: &CapturePlan, layers: &Layers, 
 /// # Errors
 /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
 pub(in crate::techniques) fn middle_of(gpu: &Gpu, scene: &GpuScene, ranges: &[Range<u32>]) -> Result<Option<Vec3>> {
+    let bounds = bounds_of(gpu, scene, ranges)?;
+    Ok(bounds.map(|[low, high]| low + 0.5 * (high - low)))
+}
+
+/// Least and greatest corner of that box.
+pub(super) fn bounds_of(gpu: &Gpu, scene: &GpuScene, ranges: &[Range<u32>]) -> Result<Option<[Vec3; 2]>> {
     let size = size_of::<SceneTriangle>() as u64;
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for range in ranges.iter().filter(|range| !range.is_empty()) {
@@ -388,5 +394,5 @@ pub(in crate::techniques) fn middle_of(gpu: &Gpu, scene: &GpuScene, ranges: &[Ra
             (low, high) = (low.min(corner), high.max(corner));
         }
     }
-    Ok((low.x <= high.x).then(|| low + 0.5 * (high - low)))
+    Ok((low.x <= high.x).then_some([low, high]))
 }

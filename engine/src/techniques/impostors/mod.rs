@@ -7,8 +7,8 @@
 //! followed through the map, and the radiance that the map has there, times what the surface mirrors, is added. With light of so many scatterings in the map as
 //! the setting says, one by default, pictures have the paths `LE|L.E|L.SE`: light that is seen in a mirror comes from the map alone.
 //!
-//! Hosts may have smooth glass [refract](ReflectionSettings::refracts) as well, at the interface that the eye sees first: the refracted ray is followed through the same map, beyond the body's other side as if that were not there.
-//! Both rays have the weights of the exact dielectric factor, and beyond the critical angle all is mirrored.
+//! Where a setting [says so](ReflectionSettings::refracts), what smooth glass lets through is followed as well, through the same map and at one interface: panes, and surfaces of bodies whose other side is none. Both rays have the weights of the
+//! exact dielectric factor, and beyond the critical angle all is mirrored. The refracted rays of each pixel's first sample are traced on: where one of them meets a second interface the picture is refused, since nothing is followed past the first.
 //!
 //! The map is captured once, before the first sample, and holds for all cameras. What reflects is left out of it, so that it may be seen from within; its shadow is in it.
 //!
@@ -17,18 +17,20 @@
 //! - What the map's place does not see is not there: reflections stick to the edges of what hides it. With further layers of surfaces, which a map by rays has, that is what lies behind more surfaces than these.
 //! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same.
 //! - Searches end beside surfaces: by how much, [`ImpostorReflections::counts`] and [`LookUp::residual`] say.
-//! - Radiance at texels' middles is joined bilinearly; with a capture by rays its noise stays, and is the same for all seeds.
+//! - Radiance at texels' middles is joined bilinearly, so that borders of shadows are up to half a texel off; with a capture by rays its noise stays, and is the same for all seeds.
+//! - A second interface less than 2⁻¹⁴ of the width of what refracts behind the first, or one that no ray of the first samples meets, is passed over.
 //! - A surface that is smooth by a texture alone is not taken for one that reflects: it is in the map, and without others there is none.
 //! - Bodies that reflect do not show in reflections, their own included.
-//! - A rasterized map has the shadows of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), none of directional lights, and draws partial alpha opaque.
+//! - A rasterized map has the shadows, and their borders, of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), none of directional lights, and draws partial alpha opaque.
 //!
 //! In the limit of many texels and steps, what convex rooms of diffuse walls show in a convex mirror is exact.
 //!
-//! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit where they do not refract, and scenes that keep their instances.
+//! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit where nothing is refracted, second interfaces where it is, and scenes that keep their instances.
 
 pub(in crate::techniques) mod capture;
 mod card;
 mod draw;
+mod interfaces;
 mod peel;
 mod reflections;
 pub(in crate::techniques) mod renderer;
@@ -37,7 +39,7 @@ mod stage;
 
 pub use capture::CaptureBy;
 pub(super) use card::CARD;
-pub(in crate::techniques) use card::refusals;
+pub(in crate::techniques) use card::map_refusals;
 pub use reflections::ImpostorReflections;
 pub(in crate::techniques) use settings::check_place;
 pub use settings::{ReflectionMethod, ReflectionSettings};

@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::capture::{Capture, CaptureBy, CapturePlan, Captured, middle_of};
 use super::card::refusals_with;
+use super::interfaces::Interfaces;
 use super::renderer::{MapRenderer, MapUse, eye_settings};
 use super::settings::ReflectionSettings;
 use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
@@ -23,7 +24,7 @@ use crate::walk::ArrivalStage;
 use crate::{Error, Result};
 
 /// The technique's name in errors.
-const TECHNIQUE: &str = "impostor";
+pub(super) const TECHNIQUE: &str = "impostor";
 
 /// A progressive rendering of one view whose smooth surfaces reflect by a map with distances.
 pub struct ImpostorReflections {
@@ -41,7 +42,11 @@ struct LookUps {
     eye: PathSet,
     place: Vec3,
     triangles: Range<u32>,
+    /// Triangles of what refracts.
+    refracting: Vec<Range<u32>>,
     reflections: Option<Reflections>,
+    /// Once there is a map, where something refracts.
+    interfaces: Option<Interfaces>,
     counts: LookUpCounts,
 }
 
@@ -50,6 +55,9 @@ impl MapUse for LookUps {
         let (map, eye) = ((captured, self.place), (&self.eye, slots));
         let reflections = Reflections::new(gpu, scene, &self.settings, map, eye, self.triangles.clone())?;
         self.reflections = Some(reflections);
+        if !self.refracting.is_empty() {
+            self.interfaces = Some(Interfaces::new(gpu, scene, self.refracting.clone())?);
+        }
         Ok(())
     }
 
@@ -58,14 +66,18 @@ impl MapUse for LookUps {
         Some(Box::new(ReflectionStage { reflections, scene }))
     }
 
-    fn count(&mut self) -> Result<()> {
-        if let Some(reflections) = &self.reflections {
-            let counts = reflections.counts()?;
-            self.counts.reflections += counts.reflections;
-            self.counts.sky += counts.sky;
-            self.counts.unfound += counts.unfound;
+    fn count(&mut self, is_first: bool) -> Result<()> {
+        let Some(reflections) = &self.reflections else {
+            return Ok(());
+        };
+        let counts = reflections.counts()?;
+        self.counts.reflections += counts.reflections;
+        self.counts.sky += counts.sky;
+        self.counts.unfound += counts.unfound;
+        match &self.interfaces {
+            Some(interfaces) if is_first => interfaces.check(self.place, &reflections.looked_up()?),
+            _ => Ok(()),
         }
-        Ok(())
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
@@ -79,7 +91,9 @@ impl MapUse for LookUps {
     }
 
     fn pipelines(&self) -> Vec<PipelineInfo> {
-        self.reflections.iter().map(Reflections::pipeline).collect()
+        let mut all: Vec<PipelineInfo> = self.reflections.iter().map(Reflections::pipeline).collect();
+        all.extend(self.interfaces.iter().map(Interfaces::pipeline));
+        all
     }
 }
 
@@ -105,7 +119,7 @@ impl ImpostorReflections {
     ///
     /// # Errors
     /// [`Error::Setting`] for a setting or size out of range, and for a reflector that is none; [`Error::Unsupported`] for a scene with participating media, with
-    /// surfaces that transmit, unless they are to [refract](ReflectionSettings::refracts), or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
+    /// surfaces that transmit, unless rays are to be [refracted](ReflectionSettings::refracts), or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
     /// [`Error::OutOfMemory`].
     pub fn new(
         gpu: &Gpu,
@@ -123,10 +137,15 @@ impl ImpostorReflections {
             });
         }
         let surfaces = scene.surfaces();
-        let left_out: Vec<Range<u32>> = reflectors(surfaces.objects, settings.reflector)?
+        let reflectors = reflectors(surfaces.objects, settings.reflector)?;
+        let triangles_of = |objects: &[&ObjectTriangles]| -> Vec<Range<u32>> {
+            let ranges = objects.iter().map(|object| object.triangles.clone());
+            ranges.filter(|range| !range.is_empty()).collect()
+        };
+        let left_out = triangles_of(&reflectors);
+        let refracting: Vec<_> = reflectors
             .into_iter()
-            .map(|object| object.triangles.clone())
-            .filter(|range| !range.is_empty())
+            .filter(|object| settings.refracts && object.transmits)
             .collect();
         let place = match settings.place {
             Some(place) => Vec3::from_array(place),
@@ -164,7 +183,9 @@ impl ImpostorReflections {
             eye,
             place,
             triangles,
+            refracting: triangles_of(&refracting),
             reflections: None,
+            interfaces: None,
             counts: LookUpCounts::default(),
         };
         Ok(Self {
@@ -194,7 +215,7 @@ impl ImpostorReflections {
     /// Does a bounded piece of work towards `samples` samples per pixel: a piece of the map, or a submission of eye paths; `None` when all samples are there.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
+    /// [`Error::Unsupported`] where refracted rays of a pixel's first sample meet a second interface; [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         self.renderer.step(samples)
     }
@@ -238,8 +259,12 @@ impl ImpostorReflections {
     /// # Errors
     /// [`Error::Setting`] without that setting; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn looked_up(&self) -> Result<Vec<LookUp>> {
+        if !self.settings.keeps_look_ups {
+            let cause = "is needed before, and is off";
+            return Err(Error::setting("keeps_look_ups", false, cause));
+        }
         let reflections = self.renderer.map_use.reflections.as_ref();
-        reflections.map_or(Ok(Vec::new()), |reflections| reflections.looked_up(self.renderer.gpu()))
+        reflections.map_or(Ok(Vec::new()), Reflections::looked_up)
     }
 
     /// The kernels with their specialization.

@@ -22,8 +22,8 @@ pub(in crate::techniques) trait MapUse: Send {
     fn take(&mut self, gpu: &Gpu, scene: &GpuScene, captured: Captured, slots: u32) -> Result<()>;
     /// The stage of a wave; `None` before there is a map, or where there is none.
     fn stage<'a>(&'a self, scene: &'a GpuScene) -> Option<Box<dyn ArrivalStage + 'a>>;
-    /// Adds the counts of a wave that has ended.
-    fn count(&mut self) -> Result<()>;
+    /// Adds the counts of a wave that has ended, and looks at what it met; `is_first` for one of pixels' first samples.
+    fn count(&mut self, is_first: bool) -> Result<()>;
     fn counters(&self) -> BTreeMap<&'static str, u64>;
     fn pipelines(&self) -> Vec<PipelineInfo>;
 }
@@ -77,10 +77,6 @@ impl<U: MapUse> MapRenderer<U> {
         }
     }
 
-    pub fn gpu(&self) -> &Gpu {
-        &self.gpu
-    }
-
     /// A piece of the map, or a submission of eye paths.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         if self.eye.samples_done() >= samples && !self.eye.is_within_wave() {
@@ -99,12 +95,13 @@ impl<U: MapUse> MapRenderer<U> {
             return Ok(Some(self.eye.step_so_far(timings, samples)));
         }
         let stage = self.map_use.stage(&self.scene);
+        let is_first = self.eye.samples_done() == 0;
         let step = self.eye.step_with(samples, stage.as_deref())?;
         let looks_up = stage.is_some();
         drop(stage);
         // They are those of a whole wave.
         if looks_up && step.is_some() && !self.eye.is_within_wave() {
-            self.map_use.count()?;
+            self.map_use.count(is_first)?;
         }
         Ok(step)
     }

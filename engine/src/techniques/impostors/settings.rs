@@ -107,6 +107,10 @@ crate::settings! {
         pub shadow_side: u32 = 1024, in 1..=16_384, unit "texels";
         /// Paths of each texel of a map by rays; more have less noise, which stays in the picture.
         pub capture_samples: u32 = 16, in 1..=65_536, unit "samples";
+        /// Smooth surfaces that transmit show what lies along the refracted ray, too, past one interface.
+        ///
+        /// Without it scenes with such surfaces are refused, and with it pictures in which refracted rays meet a second one: most solid bodies. Light paths are the same, with transmission among the specular scatterings.
+        pub refracts: bool = false;
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
         pub sampler: SamplerKind = SamplerKind::Sobol;
     }
@@ -115,8 +119,6 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
-        /// Smooth surfaces that transmit show what lies along the refracted ray, too, at one interface: as if bodies had no other side. Without it scenes with such surfaces are refused.
-        pub refracts: bool = false;
         /// Keeps what the reflected rays of the last wave were and where they were found: [`ImpostorReflections::looked_up`](super::ImpostorReflections::looked_up).
         pub keeps_look_ups: bool = false;
     }

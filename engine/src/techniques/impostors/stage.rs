@@ -6,15 +6,17 @@ use glam::Vec3;
 
 use super::capture::Captured;
 use super::settings::{ReflectionMethod, ReflectionSettings};
+use crate::Result;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL};
+use crate::gpu::shaders::constants::{
+    DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL, REFLECTION_NONE, REFLECTION_REFRACTED,
+};
 use crate::gpu::shaders::sets::{ImpostorSet, WaveSet};
 use crate::gpu::shaders::techniques::impostors::impostor_reflect as kernel;
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
 use crate::maps::impostor::Impostor;
 use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
-use crate::{Error, Result};
 
 /// A reflected ray, or a refracted one, and where the map was looked up for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +31,8 @@ pub struct LookUp {
     pub found: Vec3,
     /// |1 − g|, how far the place that was found is from a surface, relatively; 1 where nothing was searched for.
     pub residual: f32,
+    /// Whether it is a refracted ray.
+    pub is_refracted: bool,
 }
 
 /// Exact counts of look-ups.
@@ -48,6 +52,7 @@ type Record = crate::gpu::shaders::types::ReflectionRecord;
 
 /// The map on the device, and the kernel.
 pub(super) struct Reflections {
+    gpu: Gpu,
     pipeline: ComputePipeline<kernel::Kernel>,
     radiance: Buffer,
     side: u32,
@@ -76,6 +81,9 @@ impl Reflections {
             .as_ref()
             .map(|image| Impostor::new(gpu, image))
             .transpose()?;
+        let refracts = settings.refracts && scene.profile().has_transmission();
+        // Refracted rays are traced on.
+        let keeps_look_ups = settings.keeps_look_ups || refracts;
         let spec = surface_spec!(kernel, scene, {
             has_multiple_scattering: false,
             separable_masking: false,
@@ -88,8 +96,8 @@ impl Reflections {
             impostor_layers: settings.layers,
             impostor_planes: impostor.is_some(),
             reflects_in_box: settings.method == ReflectionMethod::Box,
-            keeps_look_ups: settings.keeps_look_ups,
-            refracts: settings.refracts,
+            keeps_look_ups,
+            refracts,
             ..Default::default()
         });
         let bytes = size_of::<Counters>() as u64;
@@ -98,6 +106,7 @@ impl Reflections {
             gpu.buffer(&BufferDesc::storage("reflection look-ups", bytes, Category::Work))
         };
         Ok(Self {
+            gpu: gpu.clone(),
             pipeline: gpu.compute_pipeline(&spec)?,
             radiance: captured.radiance,
             side: captured.side,
@@ -105,7 +114,7 @@ impl Reflections {
             place,
             tolerance: settings.tolerance,
             triangles,
-            records: settings.keeps_look_ups.then(records).transpose()?,
+            records: keeps_look_ups.then(records).transpose()?,
             counters: gpu.buffer(&BufferDesc::storage("reflection counters", bytes, Category::Work))?,
             counters_readback: gpu.buffer(&BufferDesc::readback("reflection counters", bytes))?,
         })
@@ -131,15 +140,14 @@ impl Reflections {
         })
     }
 
-    /// What the last wave has looked up, by slot.
-    pub fn looked_up(&self, gpu: &Gpu) -> Result<Vec<LookUp>> {
+    /// What the last wave has looked up, by slot; nothing where that is not kept.
+    pub fn looked_up(&self) -> Result<Vec<LookUp>> {
         let Some(records) = &self.records else {
-            let cause = "is needed before, and is off";
-            return Err(Error::setting("keeps_look_ups", false, cause));
+            return Ok(Vec::new());
         };
         let count = (records.bytes() / size_of::<Record>() as u64) as usize;
-        let records: Vec<Record> = gpu.read(records.view(), count)?;
-        let used = (0..).zip(records).filter(|(_, record)| record.is_used != 0);
+        let records: Vec<Record> = self.gpu.read(records.view(), count)?;
+        let used = (0..).zip(records).filter(|(_, record)| record.kind != REFLECTION_NONE);
         Ok(used
             .map(|(slot, record)| LookUp {
                 slot,
@@ -147,6 +155,7 @@ impl Reflections {
                 direction: Vec3::from_array(record.direction),
                 found: Vec3::from_array(record.found),
                 residual: record.residual,
+                is_refracted: record.kind == REFLECTION_REFRACTED,
             })
             .collect())
     }

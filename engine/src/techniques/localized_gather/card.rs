@@ -49,7 +49,7 @@ const DISPLAYED: &str = "L([SV]?|.?[DG])E";
 
 /// Why a scene cannot be modelled.
 pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
-    let mut all = impostors::refusals(profile);
+    let mut all = impostors::map_refusals(profile);
     all.extend(reasons(&[
         (
             profile.has_phong,

@@ -65,7 +65,7 @@ impl MapUse for Gathering {
         Some(Box::new(LocalizedStage { gather, scene }))
     }
 
-    fn count(&mut self) -> Result<()> {
+    fn count(&mut self, _is_first: bool) -> Result<()> {
         if let Some(gather) = &self.gather {
             self.gathers += gather.gathers()?;
         }

@@ -16,7 +16,7 @@ pub(super) const LIGHTS_MAX: u32 = 1024;
 
 #[derive(Debug)]
 pub(super) struct Drawing {
-    gbuffer: GBuffer,
+    pub gbuffer: GBuffer,
     pub lights: PreviewLights,
     shade: Shade,
 }

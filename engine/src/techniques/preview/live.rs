@@ -6,7 +6,8 @@
 //!
 //! Bias: radiance at texel centres stands for its mean over the texel; what light does among surfaces beyond direct light is in it as far as a
 //! probe that lights them says, which may be this one of the frame before. Seen from elsewhere than its point, a reflection shows what lies in the same
-//! *direction*: for a mirror at offset o the place it shows is off by |o|, an angle of up to asin(|o|/d) at distance d (parallax).
+//! *direction*: for a mirror at offset o the place it shows is off by |o|, an angle of up to asin(|o|/d) at distance d (parallax),
+//! but for what is [searched for](super::SearchedReflections) in the map's distances.
 
 use glam::Vec3;
 
@@ -17,7 +18,7 @@ use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::{Area, Gpu, Recorder};
 use crate::maps::directional_map::DirectionalMap;
 use crate::maps::octahedron::OctahedronLayout;
-use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Surfaces, View};
+use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
 use crate::transport::GpuScene;
 use crate::{Error, Result};
 
@@ -29,15 +30,21 @@ pub(super) struct LiveDrawing {
 }
 
 impl LiveDrawing {
-    /// For a map of so many texels along a side; its surfaces are lit as those of the preview, and by probes where `has_probes` says so.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, lights: &PreviewLights, side: u32, has_probes: bool) -> Result<Self> {
+    /// For a map of so many texels along a side; its surfaces are lit as those of the preview, and by probes where `has_probes` says so. `outputs` are drawn beside what shading reads.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        lights: &PreviewLights,
+        (side, outputs): (u32, &[Output]),
+        has_probes: bool,
+    ) -> Result<Self> {
         let gbuffer = GBuffer::new(
             gpu,
             &scene.surfaces(),
             &GBufferDesc {
                 size: [side; 2],
                 layering: Layering::Octants(OctantCut::default()),
-                outputs: &OUTPUTS,
+                outputs: &[&OUTPUTS[..], outputs].concat(),
             },
         )?;
         Ok(Self {
@@ -108,10 +115,40 @@ impl LiveProbe {
     /// # Errors
     /// As [`LightProbe::new`]; [`Error::MissingFeature`] where clip distances are missing.
     pub fn new(gpu: &Gpu, scene: &GpuScene, preview: &Preview, desc: LightProbeDesc, has_probes: bool) -> Result<Self> {
+        Self::make(gpu, scene, preview, (desc, &[]), has_probes)
+    }
+
+    /// As [`LiveProbe::new`], with distances and normals of what its place sees, 12 bytes a texel more, for [`SearchedReflections`](super::SearchedReflections).
+    ///
+    /// # Errors
+    /// As [`LiveProbe::new`].
+    pub fn with_distances(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        preview: &Preview,
+        desc: LightProbeDesc,
+        has_probes: bool,
+    ) -> Result<Self> {
+        let outputs = [Output::Distance, Output::Normals];
+        Self::make(gpu, scene, preview, (desc, &outputs), has_probes)
+    }
+
+    fn make(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        preview: &Preview,
+        (desc, outputs): (LightProbeDesc, &[Output]),
+        has_probes: bool,
+    ) -> Result<Self> {
         Ok(Self {
             probe: LightProbe::new(gpu, desc)?,
-            drawing: LiveDrawing::new(gpu, scene, preview.lights(), desc.side, has_probes)?,
+            drawing: LiveDrawing::new(gpu, scene, preview.lights(), (desc.side, outputs), has_probes)?,
         })
+    }
+
+    /// Pictures of what its place sees.
+    pub(super) fn gbuffer(&self) -> &GBuffer {
+        &self.drawing.gbuffer
     }
 
     /// The probe.
@@ -151,28 +188,41 @@ pub(super) const ROWS: &[Row] = &[Row {
     id: "CL-LIVE-MAP",
     name: "live maps: light at a place drawn each frame as an octahedron, for reflections of objects that move",
     role: Role::PartOf("CL-PREVIEW"),
-    limits: "No parallax: a reflection shows what lies in its direction from the map's own place.",
+    limits: "No parallax without a search: a reflection shows what lies in its direction from the map's own place, and a search finds what that place sees.",
     sources: &[
         sources::BLINN_NEWELL_1976.whole(),
         sources::GREENE_1986.whole(),
         sources::ENGELHARDT_DACHSBACHER_2008.whole(),
+        sources::SZIRMAY_KALOS_2005.whole(),
     ],
     shaders: &[
         "shaders/techniques/preview/probe.glsl",
         "shaders/techniques/preview/preview_shade.comp",
+        "shaders/techniques/preview/preview_search.comp",
+        "shaders/maps/impostor.glsl",
         "shaders/raster/surface_octant.vert",
         "shaders/maps/directional_coarser.comp",
         "shaders/maps/directional_border.comp",
         "shaders/maps/prefilter_ggx.comp",
     ],
-    bias: Some(Bias::Biased("radiance at texel centres; parallax beside its place")),
+    bias: Some(Bias::Biased(
+        "radiance at texel centres; parallax beside its place, or what a search takes for it",
+    )),
     tests: &[
         "tests/tests/preview/live.rs::irradiance_in_a_closed_room_is_that_of_rays",
         "tests/tests/preview/live.rs::reflections_at_the_middle_are_those_of_rays",
         "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
         "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
+        "tests/tests/preview/search.rs::a_search_takes_parallax_away",
+        "tests/tests/preview/search.rs::searches_that_cannot_be_are_refused",
     ],
-    api: &["clerestory::techniques::preview::LiveProbe"],
-    settings: &["clerestory::techniques::preview::LightProbeDesc"],
+    api: &[
+        "clerestory::techniques::preview::LiveProbe",
+        "clerestory::techniques::preview::SearchedReflections",
+    ],
+    settings: &[
+        "clerestory::techniques::preview::LightProbeDesc",
+        "clerestory::maps::impostor::ImpostorSettings",
+    ],
     ..Row::of(file!())
 }];

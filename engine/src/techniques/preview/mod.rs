@@ -7,8 +7,8 @@
 //! What it shows: emission; point, spot and directional lights, through shadow maps where they have a place; light of a [`LightProbe`] by two
 //! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact albedo,
 //! but for rough metals by another factor than Schlick's. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them, each frame, or as a [`FadingProbe`] now and then;
-//! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table; and a [`PlanarMirror`] is a second picture,
-//! of what a plane shows.
+//! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table; a [`PlanarMirror`] is a second picture,
+//! of what a plane shows; and [`SearchedReflections`] find in the distances of a live probe what a body mirrors, which then depends on where it is mirrored.
 //!
 //! Bias, all of it:
 //!
@@ -38,6 +38,7 @@ mod method;
 mod planar;
 pub mod probe;
 mod reflection;
+mod search;
 mod shade;
 
 pub(super) use card::CARD;
@@ -48,6 +49,7 @@ pub use method::{PreviewMethod, PreviewSettings};
 pub use planar::{MirrorPlane, PlanarMirror};
 pub use probe::{LightProbe, LightProbeDesc};
 pub use reflection::{ReflectionMap, ReflectionMapDesc};
+pub use search::SearchedReflections;
 pub use shade::{PARTS_MAX, PreviewPart};
 
 pub(in crate::techniques) use lights::LightRoom;

@@ -124,7 +124,7 @@ impl ReflectionMap {
         let table = SphericalSat::new(gpu, of, SatNumbers::TwoFloat, range)?;
         Ok(Self {
             desc,
-            drawing: LiveDrawing::new(gpu, scene, preview.lights(), desc.side, has_probes)?,
+            drawing: LiveDrawing::new(gpu, scene, preview.lights(), (desc.side, &[]), has_probes)?,
             octahedron,
             lat_long,
             table,

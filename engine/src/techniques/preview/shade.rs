@@ -234,7 +234,8 @@ fn spec(
     })
 }
 
-fn frame(seen: &Seen<'_>, part: &PreviewPart<'_>) -> PreviewFrame {
+/// What a part is shaded by.
+pub(super) fn frame(seen: &Seen<'_>, part: &PreviewPart<'_>) -> PreviewFrame {
     let Seen {
         scene,
         gbuffer,

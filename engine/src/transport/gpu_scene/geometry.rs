@@ -59,6 +59,11 @@ fn mirrors(material: &Material) -> bool {
     reflects && !material.unlit && Bsdf::from_material(material).is_delta()
 }
 
+/// Whether they let light through a smooth layer.
+fn transmits(material: &Material) -> bool {
+    mirrors(material) && material.metallic < 1.0 && material.transmission > 0.0
+}
+
 /// The triangles of each instance that is visible, from the first triangle on.
 pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
     let mut end = 0;
@@ -67,14 +72,13 @@ pub(super) fn visible_objects(scene: &Scene) -> Vec<ObjectTriangles> {
         .map(|(object, instance)| {
             let start = end;
             let mesh = &scene.meshes[instance.mesh as usize];
+            let material = mesh.material.map(|index| &scene.materials[index as usize]);
             end += mesh.triangles.len() as u32;
             ObjectTriangles {
                 object: object as u32,
                 triangles: start..end,
-                mirrors: mesh
-                    .material
-                    .map(|index| &scene.materials[index as usize])
-                    .is_some_and(mirrors),
+                mirrors: material.is_some_and(mirrors),
+                transmits: material.is_some_and(transmits),
             }
         })
         .collect()
