@@ -370,17 +370,19 @@ fn many_lights(arguments: &[&str]) -> (image::RgbImage, String) {
 
 #[test]
 fn the_lamp_of_many_lights_goes_around() {
-    // The ceiling above the lamp.
-    let sides = |frames: &str| {
-        let (picture, _) = many_lights(&["--turn", "90", "--frames", frames]);
-        [[0.15, 0.45], [0.55, 0.85]].map(|across| mean(&picture, across, [0.04, 0.2])[1])
-    };
-    let [first, third] = ["1", "3"].map(sides);
-    // The circle begins at the left of the picture, and half a round later is at the right.
-    assert!(
-        first[0] > 1.2 * first[1] && third[1] > 1.2 * third[0],
-        "{first:?} {third:?}"
-    );
+    for placement in ["walks", "incremental"] {
+        // The ceiling above the lamp.
+        let sides = |frames: &str| {
+            let (picture, _) = many_lights(&["--turn", "90", "--frames", frames, "--placement", placement]);
+            [[0.15, 0.45], [0.55, 0.85]].map(|across| mean(&picture, across, [0.04, 0.2])[1])
+        };
+        let [first, third] = ["1", "3"].map(sides);
+        // The circle begins at the left of the picture, and half a round later is at the right.
+        assert!(
+            first[0] > 1.2 * first[1] && third[1] > 1.2 * third[0],
+            "{placement}: {first:?} {third:?}"
+        );
+    }
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! A window on a scene whose lamp moves, lit anew in every frame by many virtual lights.
 //!
-//! `many_lights [SCENE] [--lights N] [--visibility none|rays|maps] [--bound none|geometry|distance] [--interleave TILES] [--turn DEGREES] [--camera NAME]
-//! [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--keys KEYS] [--screenshot FILE]`
+//! `many_lights [SCENE] [--lights N] [--placement walks|rsm|incremental] [--visibility none|rays|maps] [--bound none|geometry|distance] [--interleave TILES]
+//! [--turn DEGREES] [--camera NAME] [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--keys KEYS] [--screenshot FILE]`
 //!
 //! Each frame the lamp goes around the middle of the scene by `--turn`, its virtual lights are left anew where its light lands, and every pixel gathers the light
-//! of its part of them. Space holds the lamp, and the picture converges. V goes on to the next way to tell who sees a virtual light, B to the next bound of its
-//! brightness up close, + and - double and halve the lights, F shows the tiles without their filter, P goes on to the next part of the light: all, what lamps send
-//! directly, or what virtual lights bring. Otherwise as the viewer.
+//! of its part of them; with `--placement incremental` those that the lamp still sees stay where they are. Space holds the lamp, and the picture converges. V goes on
+//! to the next way to tell who sees a virtual light, B to the next bound of its brightness up close, + and - double and halve the lights, F shows the tiles without
+//! their filter, P goes on to the next part of the light: all, what lamps send directly, or what virtual lights bring. Otherwise as the viewer.
 //!
 //! Source of the program's form: S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR 2007.
 
@@ -19,7 +19,7 @@ use clerestory::film::PixelFormat;
 use clerestory::gpu::{Buffer, Gpu};
 use clerestory::settings::TypedSettings;
 use clerestory::techniques::instant_radiosity::Bound;
-use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Visibility};
+use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Placement, Visibility};
 use clerestory::transport::{GpuScene, PathSet};
 use clerestory_samples::arguments::Arguments;
 use clerestory_samples::carousel::Carousel;
@@ -49,11 +49,19 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<()> {
-    let own = ["--lights", "--visibility", "--bound", "--interleave", "--turn"];
+    let own = [
+        "--lights",
+        "--placement",
+        "--visibility",
+        "--bound",
+        "--interleave",
+        "--turn",
+    ];
     let given = Arguments::of_process(&[&own[..], &window::Options::NAMES].concat(), 1)?;
     let standard = ManyLightSettings::default();
     let settings = ManyLightSettings::from_json(&serde_json::json!({
         "lights": given.value("--lights")?.unwrap_or(LIGHTS),
+        "placement": given.text("--placement").unwrap_or("walks"),
         "visibility": given.text("--visibility").unwrap_or("rays"),
         "bound": given.text("--bound").unwrap_or("geometry"),
         "interleave": given.value("--interleave")?.unwrap_or(standard.interleave),
@@ -147,7 +155,8 @@ impl ManyLights {
             self.scene
                 .move_light(&self.gpu, self.lamp.light(), &self.lamp.at(self.angle))?;
         }
-        if view.pose != orbit.pose() {
+        let keeps_lights = self.settings.placement == Placement::Incremental;
+        if view.pose != orbit.pose() || (lamp_moves && keeps_lights) {
             view.renderer.set_camera(&orbit.camera())?;
             (view.pose, view.samples) = (orbit.pose(), 0);
         } else if lamp_moves {

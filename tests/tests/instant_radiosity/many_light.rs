@@ -1,6 +1,7 @@
 //! Deferred frames of many lights against the path tracer, against themselves without tiles, and by exact counts.
 
 mod discs;
+mod kept;
 mod reflective;
 mod tiles;
 

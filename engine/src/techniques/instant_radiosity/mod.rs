@@ -4,6 +4,7 @@ mod append;
 mod card;
 mod cut_tree;
 mod gather;
+pub mod incremental;
 pub mod many_light;
 mod renderer;
 pub mod selection;

@@ -24,7 +24,7 @@ use crate::{Error, Result};
 const BIAS: Bias = Bias::Biased(
     "what the bound of the geometry term leaves out is not compensated; the filter averages the light of neighbouring pixels on a surface; \
      visibility by maps errs at borders of shadows by their texels, by imperfect ones also by what their points miss or hang over, and without any light goes through \
-     everything; by reflective shadow maps a texel's middle stands for all of the texel; \
+     everything; by reflective shadow maps a texel's middle stands for all of the texel; lights that are kept stand for all directions in every frame; \
      silhouettes are the rasterizer's, off by parts of a pixel",
 );
 
@@ -50,7 +50,7 @@ const KERNELS: [&ShaderInfo; 13] = [
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "many-light",
-    summary: "many lights on a deferred frame: direct light and one reflection more, of virtual lights from walks or reflective shadow maps that are shared out among interleaved tiles, with shadow rays, shadow maps, imperfect ones or nothing",
+    summary: "many lights on a deferred frame: direct light and one reflection more, of virtual lights from walks, from reflective shadow maps or kept from frame to frame that are shared out among interleaved tiles, with shadow rays, shadow maps, imperfect ones or nothing",
     rows: &[ROWS],
     bias: BIAS,
     needs: NEEDS,
@@ -132,6 +132,8 @@ impl Technique for ManyLight {
             ("walks_absorbed", c.walks.absorbed),
             ("views_of_lights", c.views),
             ("virtual_lights", c.lights),
+            ("kept_lights_renewed", c.renewed),
+            ("kept_lights_asked", c.sight_rays),
             ("connections", c.connections),
             ("visibility_tests", c.visibility_tests),
             ("shadow_maps", c.maps),
@@ -172,6 +174,11 @@ impl Technique for ManyLight {
                 "virtual lights come from walks",
             ),
             (
+                lights && settings.placement == Placement::Incremental,
+                "walks and reflective shadow maps",
+                "virtual lights are kept from frame to frame",
+            ),
+            (
                 lights && !settings.filters(),
                 "filter of neighbouring pixels",
                 "it was not asked for, or all pixels have all lights",
@@ -191,7 +198,7 @@ const DISPLAYED: &str = "bounces=0..2,lobes=diffuse+glossy+reflection+transmissi
 const ROWS: &[Row] = &[
     Row {
         id: "SVO-P12",
-        name: "technique `many-light`: deferred frames of direct light and of one reflection more by virtual lights, new for each frame",
+        name: "technique `many-light`: deferred frames of direct light and of one reflection more by virtual lights, new for each frame or kept",
         role: Role::Technique,
         limits: "One indirect bounce, by lobes other than mirrors; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated.",
         sources: &[
@@ -333,6 +340,43 @@ const ROWS: &[Row] = &[
         ],
         settings: &["gathering", "disc_samples", "disc_radius"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/discs.rs")
+    },
+    Row {
+        id: "SVO-G2",
+        name: "incremental instant radiosity: virtual lights of points and spots that are kept from frame to frame, with shares of the power by Voronoi cells of their directions",
+        role: Role::PartOf("SVO-P12"),
+        limits: "One bounce in scenes where nothing but lamps moves; what a set of directions misses it misses in every frame, and after a jump of a lamp new lights take frames to come; up to 256 exact shadow maps are kept.",
+        sources: &[sources::LAINE_2007.whole(), sources::SUN_2015.at("§2.2.2")],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/kept.glsl",
+            "shaders/techniques/instant_radiosity/kept_rays.comp",
+            "shaders/techniques/instant_radiosity/kept_lights.comp",
+        ],
+        bias: Some(Bias::Consistent(
+            "each light stands for the directions that are nearest to its own; of a point's sets that were just spread the mean over seeds is exact",
+        )),
+        needs: NEEDS,
+        tests: &[
+            "engine/src/techniques/instant_radiosity/incremental/voronoi.rs::circles_about_corners_are_empty_and_cells_fill_the_domain",
+            "engine/src/techniques/instant_radiosity/incremental/voronoi.rs::degenerate_sets_have_their_cells",
+            "engine/src/techniques/instant_radiosity/incremental/voronoi.rs::neighbours_are_all_that_a_cell_needs",
+            "engine/src/techniques/instant_radiosity/incremental/voronoi.rs::gaps_are_where_no_point_is",
+            "engine/src/techniques/instant_radiosity/incremental/directions.rs::spread_sets_have_nothing_to_renew",
+            "engine/src/techniques/instant_radiosity/incremental/directions.rs::spread_sets_have_narrower_gaps_than_independent_points",
+            "engine/src/techniques/instant_radiosity/incremental/directions.rs::what_is_lost_comes_back_under_the_quota",
+            "engine/src/techniques/instant_radiosity/incremental/directions.rs::twins_part_and_turns_are_even",
+            "engine/src/techniques/instant_radiosity/incremental/lamp.rs::directions_are_found_again_and_lie_within_the_cone",
+            "engine/src/techniques/instant_radiosity/incremental/lamp.rs::equal_areas_have_equal_shares_of_the_power",
+            "tests/tests/instant_radiosity/many_light/kept.rs::still_lamps_keep_all_lights_and_their_maps",
+            "tests/tests/instant_radiosity/many_light/kept.rs::moved_lamps_renew_no_more_than_the_quota",
+            "tests/tests/instant_radiosity/many_light/kept.rs::lamps_that_jump_lose_what_they_do_not_see",
+            "tests/tests/instant_radiosity/many_light/kept.rs::kept_lights_have_all_of_the_power",
+            "tests/tests/instant_radiosity/many_light/kept.rs::means_over_seeds_are_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/kept.rs::other_lights_are_refused",
+        ],
+        api: &["clerestory::techniques::instant_radiosity::incremental"],
+        settings: &["placement", "renewed"],
+        ..Row::of("engine/src/techniques/instant_radiosity/incremental/mod.rs")
     },
     Row {
         id: "SVO-B0",

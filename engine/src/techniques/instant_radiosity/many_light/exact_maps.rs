@@ -4,12 +4,14 @@ use glam::Vec3;
 
 use super::maps::maps_at_once;
 use super::records::LightRecord;
-use super::settings::ManyLightSettings;
+use super::settings::{ManyLightSettings, Placement};
 use crate::Result;
 use crate::gpu::{Gpu, Recorder, TexelView};
-use crate::raster::{Coverage, DrawPart, OmniShadowDesc, OmniShadowMaps, ShadowLayout, Surfaces, View};
+use crate::raster::{
+    Coverage, DrawPart, OmniShadowDesc, OmniShadowMaps, SHADOW_MAPS_MAX, ShadowLayout, Surfaces, View,
+};
 
-/// Maps at the same time at most.
+/// Maps at the same time at most, where they are drawn anew for each frame.
 const MAPS_AT_ONCE: u32 = 64;
 /// Triangles that a submission draws, about, each in every octant of a map.
 const TRIANGLES_AT_ONCE: u64 = 1 << 18;
@@ -35,7 +37,11 @@ impl ExactMaps {
     pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, settings: &ManyLightSettings) -> Result<Self> {
         let side = settings.map_side;
         let bytes = size_of::<f32>() as u64 * u64::from(side) * u64::from(side);
-        let maps = maps_at_once(settings, bytes).min(MAPS_AT_ONCE);
+        let most = match settings.placement {
+            Placement::Incremental => SHADOW_MAPS_MAX,
+            Placement::Walks | Placement::Rsm => MAPS_AT_ONCE,
+        };
+        let maps = maps_at_once(settings, bytes).min(most);
         let desc = OmniShadowDesc {
             layout: ShadowLayout::Octahedron,
             side,

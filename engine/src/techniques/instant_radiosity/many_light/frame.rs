@@ -5,6 +5,7 @@ use std::ops::Range;
 use glam::DVec2;
 
 use super::kernels::{Sight, seen_from};
+use super::maps::Maps;
 use super::reflective::{LightView, Reflective};
 use super::renderer::{Indirect, LightSource, ManyLight};
 use crate::gpu::shaders::types::SeenFrom;
@@ -27,12 +28,16 @@ pub(super) struct Frame {
     views: u32,
     /// What was drawn is visible to compute shaders.
     is_shown: bool,
+    /// A shadow map of a virtual light was drawn.
+    has_maps: bool,
     stage: Stage,
 }
 
 /// What comes next.
 enum Stage {
     Walks(Box<Tracing>),
+    /// Virtual lights that are kept, for lamps as they are now.
+    Kept,
     /// What reflective shadow maps are drawn from.
     Emitters,
     /// A part of the view of a light, of so many.
@@ -103,6 +108,10 @@ impl ManyLight {
                 source: LightSource::Walks(tracer),
                 ..
             }) => Stage::Walks(Box::new(tracer.begin(self.done, None))),
+            Some(Indirect {
+                source: LightSource::Kept(_),
+                ..
+            }) => Stage::Kept,
             Some(_) => Stage::Emitters,
             None if self.discs.is_some() => Stage::Emitters,
             None => self.first_drawing(),
@@ -113,6 +122,7 @@ impl ManyLight {
             lights: 0,
             views: 0,
             is_shown: false,
+            has_maps: false,
             stage,
         })
     }
@@ -130,6 +140,7 @@ impl ManyLight {
         let stage = std::mem::replace(&mut frame.stage, Stage::Ended);
         let (timings, next) = match stage {
             Stage::Walks(tracing) => self.walk(frame, tracing)?,
+            Stage::Kept => self.keep(frame)?,
             Stage::Emitters => self.emit()?,
             Stage::View(views) => self.draw_view(*views)?,
             Stage::OnViews(views) => self.place_on_views(frame, views)?,
@@ -166,6 +177,18 @@ impl ManyLight {
         let traced = tracing.into_traced();
         self.counts.walks += traced.counts;
         Ok((timings, self.placed(frame, traced.records)?))
+    }
+
+    fn keep(&mut self, frame: &mut Frame) -> Result<(Vec<Timings>, Stage)> {
+        let Some(LightSource::Kept(kept)) = self.indirect.as_mut().map(|indirect| &mut indirect.source) else {
+            return Ok((Vec::new(), self.first_drawing()));
+        };
+        let done = kept.keep(&self.gpu, &self.scene)?;
+        let lights = kept.count();
+        self.counts.passes += done.passes;
+        self.counts.renewed += done.renewed;
+        self.counts.sight_rays += done.rays;
+        Ok((done.timings, self.placed(frame, lights)?))
     }
 
     /// What comes behind the virtual lights of a frame.
@@ -381,14 +404,32 @@ impl ManyLight {
         }
     }
 
-    fn draw_maps(&mut self, frame: &Frame, first: u32, from: [u32; 2]) -> Result<(Vec<Timings>, Stage)> {
+    /// Lights of the range whose maps are to be drawn next: all of them, or of those that are kept, where every light has a map, the next ones without theirs.
+    fn to_draw(&self, frame: &Frame, lights: Range<u32>) -> Option<Range<u32>> {
+        let Indirect { source, maps, .. } = self.indirect.as_ref()?;
+        match source {
+            LightSource::Kept(kept) if maps.as_ref()?.at_once() >= frame.lights => kept.unmapped(lights.start),
+            _ => Some(lights).filter(|lights| !lights.is_empty()),
+        }
+    }
+
+    fn draw_maps(&mut self, frame: &mut Frame, first: u32, [light, part]: [u32; 2]) -> Result<(Vec<Timings>, Stage)> {
+        let at_once = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
+        let all = (first + at_once.map_or(0, Maps::at_once)).min(frame.lights);
+        let lights = self.to_draw(frame, light..all);
         let maps = self.indirect.as_mut().and_then(|indirect| indirect.maps.as_mut());
-        let Some(maps) = maps else {
-            return Ok((Vec::new(), Stage::Merge(0)));
+        let gather = Stage::Gather {
+            lights: first..all,
+            place: 0,
+            sweeps: 0,
         };
-        let end = (first + maps.at_once()).min(frame.lights);
+        let (Some(lights), Some(maps)) = (lights, maps) else {
+            return Ok((Vec::new(), gather));
+        };
+        let from = [lights.start, if lights.start == light { part } else { 0 }];
         let points = u64::from(maps.points());
-        let (drawing, next) = maps.plan(&self.scene.surfaces(), from, end)?;
+        let (drawing, next) = maps.plan(&self.scene.surfaces(), from, lights.end)?;
+        let begins = !std::mem::replace(&mut frame.has_maps, true);
         let timings = self.submit(|own, recorder| {
             let maps = own.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
             let surfaces = own.scene.surfaces();
@@ -396,19 +437,18 @@ impl ManyLight {
                 return Ok(());
             };
             let lights = (indirect.source.records(), frame.lights);
-            maps.record(recorder, &surfaces, lights, first, &drawing)
+            maps.record(recorder, &surfaces, lights, begins, first, &drawing)
         })?;
         let drawn = u64::from(next[0] - from[0]);
         self.counts.maps += drawn;
         self.counts.splats += drawn * points;
-        let next = if next[0] < end {
+        if let Some(LightSource::Kept(kept)) = self.indirect.as_mut().map(|indirect| &mut indirect.source) {
+            kept.have_maps(from[0]..next[0]);
+        }
+        let next = if next[0] < all {
             Stage::Maps { first, from: next }
         } else {
-            Stage::Gather {
-                lights: first..end,
-                place: 0,
-                sweeps: 0,
-            }
+            gather
         };
         Ok((timings, next))
     }

@@ -76,16 +76,17 @@ impl ImperfectMaps {
         light..light.saturating_add(self.drawn_at_once).min(end)
     }
 
-    /// Records the maps of some lights, before those of the frame's first light where all lights and points are; the light `first` has the first map.
+    /// Records the maps of some lights, before the first ones of a frame where all lights and points are; the light `first` has the first map.
     pub fn record(
         &self,
         recorder: &mut Recorder,
         surfaces: &Surfaces<'_>,
         (records, lights): (&TexelView, u32),
+        begins: bool,
         first: u32,
         drawn: &Splatting,
     ) -> Result<()> {
-        if drawn.start == 0 {
+        if begins {
             self.atlas.record_surfels(recorder, surfaces)?;
             recorder.pass("many-light: places of lights", |pass| {
                 let barrier = |from, to| BufferBarrier {

@@ -115,19 +115,20 @@ impl Maps {
         }
     }
 
-    /// Records a drawing; the light `first` has the first map. `records` are those of the frame's `lights`.
+    /// Records a drawing; the light `first` has the first map. `records` are those of the frame's `lights`, and `begins` is for its first drawing.
     pub fn record(
         &self,
         recorder: &mut Recorder,
         surfaces: &Surfaces<'_>,
         (records, lights): (&TexelView, u32),
+        begins: bool,
         first: u32,
         drawing: &Drawing,
     ) -> Result<()> {
         match (self, drawing) {
             (Self::Exact(exact), Drawing::Exact(drawings)) => exact.record(recorder, surfaces, first, drawings),
             (Self::Imperfect(imperfect), Drawing::Imperfect(range)) => {
-                imperfect.record(recorder, surfaces, (records, lights), first, range)
+                imperfect.record(recorder, surfaces, (records, lights), begins, first, range)
             }
             // Drawings are those of these maps.
             _ => Ok(()),

@@ -1,11 +1,13 @@
-//! Many lights on the surfaces of a deferred frame: direct light and one reflection more, of virtual lights that are new for each frame.
+//! Many lights on the surfaces of a deferred frame: direct light and one reflection more, of virtual lights that are new for each frame
+//! or kept from frame to frame.
 //!
 //! Sources: A. Keller, "Instant Radiosity", SIGGRAPH 1997; A. Keller and W. Heidrich, "Interleaved Sampling", EGWR 2001; B. Segovia et al., "Non-interleaved Deferred
 //! Shading of Interleaved Sample Patterns", Graphics Hardware 2006; S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR
 //! 2007; C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005; T. Ritschel et al., "Imperfect Shadow Maps for Efficient Computation of Indirect
 //! Illumination", SIGGRAPH Asia 2008; C. Sun, "Many-Light Real-Time Global Illumination using Sparse Voxel Octree", Master's thesis, WPI, 2015, §3.3 and §4.5 to §4.12.
 //!
-//! A frame is a sample of every pixel: walks from the lights, or points on reflective shadow maps of them, leave a virtual light each where they first land; a G-buffer is rasterized; a kernel adds what is emitted and
+//! A frame is a sample of every pixel: walks from the lights, or points on reflective shadow maps of them, leave a virtual light each where they first land, or those of points and spots are
+//! kept from frame to frame ([`incremental`](crate::techniques::instant_radiosity::incremental)); a G-buffer is rasterized; a kernel adds what is emitted and
 //! what arrives directly, with two rays a pixel; the G-buffer is split into n × n tiles ([`Interleaving`]), each place gathers from its tile's subset of the virtual
 //! lights, and sums go back to their pixels, where a filter averages those of neighbours on the same surface.
 //!
@@ -20,6 +22,7 @@
 //!   virtual light transmits through its own surface is in the shadow of that. `imperfect` errs so, and by what its points miss or cover too much
 //!   ([`splat_atlas`](crate::raster::splat_atlas)), and has cut-outs opaque. `rays` adds no error.
 //! - *Placement.* By walks exact. By reflective shadow maps what a texel's middle meets stands for all of the texel, so that light ends a texel from where it should.
+//!   Lights that are kept stand for all directions of their lamps in every frame: a picture of many frames has the error of one, of the order of one over the lights.
 //! - *Discs.* What is gathered from texels in discs comes through everything, and what lies beyond a disc or the view that it is in is missing; the published weight is off
 //!   by what the light falls or grows over a disc.
 //! - *Edges.* Rasterizers round corners to parts of a pixel (1/256 here): what is seen at a silhouette may be what lies behind, as far beside it, even where that is inside
@@ -30,7 +33,7 @@
 //! Without bound and filter and with rays a frame's expected picture is that of its light paths, except that numbers of lights which a tile has follow those which
 //! have landed: an error of the order of one over the walks.
 //!
-//! Guarantees: deterministic in (seed, frame), on any number of threads; a submission is a bounded piece of work; pairs of pixels and lights are nowhere stored; what
+//! Guarantees: deterministic in (seed, frame), and where lights are kept in where their lamps have been, on any number of threads; a submission is a bounded piece of work; pairs of pixels and lights are nowhere stored; what
 //! settings or scene do not ask for costs no pass and no buffer.
 
 mod card;
@@ -39,6 +42,7 @@ mod exact_maps;
 mod frame;
 mod imperfect_maps;
 mod interleave;
+mod kept;
 mod kernels;
 mod maps;
 mod records;

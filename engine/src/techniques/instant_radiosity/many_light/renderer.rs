@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
+
 use super::card::refusals;
 use super::discs::Discs;
 use super::frame::Frame;
+use super::kept::KeptLights;
 use super::kernels::{Direct, Seen, Split};
 use super::maps::Maps;
 use super::records::LightRecord;
@@ -38,8 +41,12 @@ pub struct ManyLightCounts {
     pub walks: PhotonCounts,
     /// Views of lights that were drawn, of reflective shadow maps.
     pub views: u64,
-    /// Virtual lights of all frames.
+    /// Virtual lights of all frames, with those of kept ones that have no light.
     pub lights: u64,
+    /// Kept ones that were placed anew, the first ones among them.
+    pub renewed: u64,
+    /// Rays that told whether a lamp that has moved still sees a kept light.
+    pub sight_rays: u64,
     /// Pairs of a pixel and a virtual light.
     pub connections: u64,
     /// Pairs whose visibility was asked for: the others bring nothing, whatever stands between.
@@ -80,6 +87,7 @@ pub struct ManyLight {
 pub(super) enum LightSource {
     Walks(Box<PhotonTracer>),
     Reflective(Box<Reflective>),
+    Kept(Box<KeptLights>),
 }
 
 impl LightSource {
@@ -88,6 +96,7 @@ impl LightSource {
         match self {
             Self::Walks(tracer) => tracer.records(),
             Self::Reflective(reflective) => reflective.records(),
+            Self::Kept(kept) => kept.records(),
         }
     }
 
@@ -95,6 +104,7 @@ impl LightSource {
         match self {
             Self::Walks(tracer) => tracer.set_seed(seed),
             Self::Reflective(reflective) => reflective.set_seed(seed),
+            Self::Kept(kept) => kept.set_seed(seed),
         }
     }
 
@@ -102,6 +112,7 @@ impl LightSource {
         match self {
             Self::Walks(tracer) => tracer.pipelines(),
             Self::Reflective(reflective) => reflective.pipelines(),
+            Self::Kept(kept) => kept.pipelines(),
         }
     }
 
@@ -110,6 +121,7 @@ impl LightSource {
         match self {
             Self::Walks(_) => 0,
             Self::Reflective(reflective) => reflective.bytes(),
+            Self::Kept(kept) => kept.bytes(),
         }
     }
 }
@@ -125,7 +137,8 @@ impl ManyLight {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a setting, camera or size out of range, [`Error::Unsupported`] for a scene that it cannot model, with every reason,
+    /// [`Error::Setting`] for a setting, camera or size out of range, [`Error::Unsupported`] for a scene that it cannot model, or whose virtual lights cannot be
+    /// kept where that is asked for, with every reason,
     /// [`Error::LimitExceeded`] for a picture or shadow maps larger than a buffer of the device or a ray index whose leaves are too long for a software device,
     /// [`Error::MissingFeature`] for shadow maps where the device has no clip distances, [`Error::OutOfMemory`].
     pub fn new(
@@ -226,7 +239,7 @@ impl ManyLight {
         seen + split + source + maps.map_or(0, Maps::bytes)
     }
 
-    /// The virtual lights that a frame has placed last, those of all together; none before the first ones.
+    /// The virtual lights that a frame has placed last, those of all together that have power; none before the first ones.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
@@ -238,6 +251,7 @@ impl ManyLight {
         Ok(records
             .iter()
             .map(|record| record.light(self.settings.lights))
+            .filter(|light| light.power != Vec3::ZERO)
             .collect())
     }
 
@@ -256,7 +270,8 @@ impl ManyLight {
         all
     }
 
-    /// Looks through another camera and begins anew.
+    /// Looks through another camera and begins anew, also where a light has [moved](GpuScene::move_light). Virtual lights that are kept stay
+    /// ([`Placement::Incremental`]).
     ///
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
@@ -268,7 +283,7 @@ impl ManyLight {
         Ok(())
     }
 
-    /// Forgets everything gathered so far and begins anew with this seed, with the kernels there are.
+    /// Forgets everything gathered so far, kept virtual lights too, and begins anew with this seed, with the kernels there are.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
@@ -362,6 +377,7 @@ impl Indirect {
                 LightSource::Walks(Box::new(tracer))
             }
             Placement::Rsm => LightSource::Reflective(Box::new(Reflective::new(gpu, scene, settings)?)),
+            Placement::Incremental => LightSource::Kept(Box::new(KeptLights::new(gpu, scene, settings)?)),
         };
         let maps = Maps::new(gpu, &scene.surfaces(), settings)?;
         Ok(Self {

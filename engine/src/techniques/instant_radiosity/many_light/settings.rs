@@ -1,6 +1,7 @@
 //! Settings of frames of many lights.
 
 use crate::gpu::shaders::constants::{VISIBILITY_MAPS, VISIBILITY_NONE, VISIBILITY_RAYS};
+use crate::techniques::instant_radiosity::incremental::DIRECTIONS_MAX;
 use crate::techniques::instant_radiosity::settings::Bound;
 use crate::transport::PathSet;
 use crate::transport::edge_bound::EdgeBound;
@@ -43,6 +44,8 @@ pub enum Placement {
     Walks,
     /// Reflective shadow maps of the lights.
     Rsm,
+    /// They are kept from frame to frame where their lamps still see them, and a few are placed anew.
+    Incremental,
 }
 
 /// Points that choose texels of reflective shadow maps.
@@ -77,13 +80,17 @@ const INTERLEAVE_MAX: u32 = 16;
 crate::settings! {
     /// Settings of frames of many lights.
     pub struct ManyLightSettings {
-        /// Virtual lights of each frame: as many walks from the lights, each of which leaves one where it first lands on a surface that is no mirror, or points on reflective
-        /// shadow maps.
+        /// Virtual lights of each frame: as many walks from the lights, each of which leaves one where it first lands on a surface that is no mirror, points on reflective
+        /// shadow maps, or directions of the lamps.
         pub lights: u32 = 512, in 1..=1 << 16, unit "lights per frame";
-        /// Where they come from: walks, or reflective shadow maps of the lights, drawn anew each frame, whose texels are chosen by what they reflect.
+        /// Where they come from: walks; reflective shadow maps of the lights, drawn anew each frame, whose texels are chosen by what they reflect; or, of points and spots alone,
+        /// incremental: they are kept from frame to frame, weighted by the directions of the lamp that are nearest to them.
         ///
-        /// Source: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005.
+        /// Sources: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005; S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect
+        /// Illumination", EGSR 2007.
         pub placement: Placement = Placement::Walks;
+        /// Kept lights that are placed anew in a frame at most, but for the first one: in place of those that a lamp which has moved no longer sees, or that crowd others.
+        pub renewed: u32 = 8, in 1..=DIRECTIONS_MAX, unit "lights per frame";
         /// Along a side of each view of a light, of which a point light has six; a power of two.
         pub rsm_side: u32 = 64, in 8..=1024, unit "texels";
         /// Points that choose texels of reflective shadow maps; changes the noise only.
@@ -156,6 +163,10 @@ impl ManyLightSettings {
         if self.gathering != Gathering::Lights && self.placement != Placement::Rsm {
             let cause = "needs reflective shadow maps: placement = \"rsm\"";
             return Err(Error::setting("gathering", format!("{:?}", self.gathering), cause));
+        }
+        if self.placement == Placement::Incremental && self.lights > DIRECTIONS_MAX {
+            let cause = format!("are more than the {DIRECTIONS_MAX} that placement = \"incremental\" keeps");
+            return Err(Error::setting("lights", self.lights, cause));
         }
         if !self.rsm_side.is_power_of_two() {
             return Err(Error::setting("rsm_side", self.rsm_side, "is no power of two"));

@@ -1,6 +1,7 @@
-//! Virtual lights on the host, in the unit box of the digest: their walks, their potential, and orders in which points take them.
+//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, and orders in which points take them; on the device those that are kept from frame to frame.
 
 mod unit_box;
+pub mod vpl_incremental;
 pub mod vpl_order;
 pub mod vpl_potential;
 pub mod vpl_walks;

@@ -1,0 +1,382 @@
+//! Frames of a lamp that moves, lit by virtual lights that are kept or new: time, shadow maps, errors, and how much pictures change.
+//!
+//! Source: S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR 2007. Oracle: frames of many more new lights, with shadow rays.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use clerestory::film::picture;
+use clerestory::gpu::Gpu;
+use clerestory::scene::{LightKind, Scene, SceneProfile};
+use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Placement, Visibility};
+use clerestory::transport::GpuScene;
+use clerestory::{Result, scene};
+use glam::{DVec3, Vec3};
+
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
+use crate::experiments::measures::Context;
+use crate::experiments::reference::short_name;
+
+/// Scenes, whether the lamp is a spot, where it begins and how far it goes on in a frame, as shares of the box around each.
+const SCENES: [(&str, bool, Vec3, Vec3); 3] = [
+    (
+        "builtin:cornell-box",
+        false,
+        Vec3::new(0.3, 0.75, 0.5),
+        Vec3::new(0.01, 0.0, 0.01),
+    ),
+    (
+        "builtin:box-room",
+        true,
+        Vec3::new(0.35, 0.6, 0.5),
+        Vec3::new(0.01, 0.0, 0.0),
+    ),
+    (
+        "builtin:conference",
+        false,
+        Vec3::new(0.35, 0.8, 0.5),
+        Vec3::new(0.005, 0.0, 0.0),
+    ),
+];
+/// Pixels, lights, texels along a side of a map, frames of a lamp that moves, lights of the oracle, and frames between two of those.
+const FULL: Form = Form {
+    side: 48,
+    lights: 256,
+    map_side: 64,
+    frames: 24,
+    oracle: 16_384,
+    every: 4,
+};
+const SMOKE: Form = Form {
+    side: 12,
+    lights: 32,
+    map_side: 8,
+    frames: 5,
+    oracle: 256,
+    every: 2,
+};
+const RENEWED: u32 = 8;
+/// The oracle's lights are none of those that it judges.
+const ORACLE_SEED: u32 = 1000;
+/// Frames of a lamp that stands still.
+const STILL: u32 = 8;
+const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
+const KEPT: &str = "kept lights";
+const NEW: &str = "new walks";
+const WAYS: [(&str, Placement); 2] = [(KEPT, Placement::Incremental), (NEW, Placement::Walks)];
+
+#[derive(Clone, Copy)]
+struct Form {
+    side: u32,
+    lights: u32,
+    map_side: u32,
+    frames: u32,
+    oracle: u32,
+    every: u32,
+}
+
+rows! {
+    /// Where virtual lights come from.
+    struct Row = "Frames of a lamp that moves" by [scene, way] {
+        scene: String = "scene",
+        way: String = "virtual lights",
+        renewed: u64 = "most new lights of a frame",
+        maps: Repeats = "maps",
+        time: Repeats = "frame (ms)",
+        error: Repeats = "relative RMSE",
+        change: Repeats = "change from frame to frame over the mean",
+    }
+}
+rows! {
+    /// What frames of a lamp that stands still do.
+    struct Still = "Frames of a lamp that stands still, kept lights" by [scene] {
+        scene: String = "scene",
+        lights: u64 = "new lights",
+        rays: u64 = "rays to lights",
+        maps: u64 = "maps",
+    }
+}
+rows! {
+    /// Kept lights beside new ones.
+    struct Pair = "Kept lights beside new walks" by [scene] {
+        scene: String = "scene",
+        renewed: u64 = "most new lights of a frame",
+        faster: Measured = "time of new walks over that of kept lights",
+        error: Measured = "error of kept lights over that of new walks",
+        change: Measured = "change from frame to frame over that of new walks",
+    }
+}
+
+/// What was found.
+#[derive(Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    moving: Vec<Row>,
+    still: Vec<Still>,
+}
+
+const OF_PAIRS: &[Criterion<Pair>] = &[
+    Criterion::each(
+        "no more than 8 lights are new in a frame: the most",
+        Bound::AtMost(RENEWED as f64),
+        |row: &Pair| row.renewed.into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "frames take half of the time at most: that of new walks over this",
+        Bound::AtLeast(2.0),
+        |row: &Pair| row.faster,
+    ),
+    Criterion::each(
+        "kept lights err no more than new ones: ratio of errors",
+        Bound::AtMost(1.0),
+        |row: &Pair| row.error,
+    ),
+    Criterion::each(
+        "pictures change less from frame to frame: ratio of changes",
+        Bound::AtMost(1.0),
+        |row: &Pair| row.change,
+    ),
+];
+
+const OF_STILL: &[Criterion<Still>] = &[Criterion::each(
+    "nothing is new while the lamp stands: lights, rays and maps",
+    Bound::AtMost(0.0),
+    |row: &Still| (row.lights + row.rays + row.maps).into(),
+)
+.in_every_form()];
+
+fn pairs(rows: &[Row]) -> Vec<Pair> {
+    let kept = rows.iter().filter(|row| row.way == KEPT);
+    let pair = |kept: &Row| {
+        let new = rows.iter().find(|row| row.scene == kept.scene && row.way == NEW)?;
+        Some(Pair {
+            scene: kept.scene.clone(),
+            renewed: kept.renewed,
+            faster: new.time.over(&kept.time).measured(),
+            error: kept.error.over(&new.error).measured(),
+            change: kept.change.over(&new.change).measured(),
+        })
+    };
+    kept.filter_map(pair).collect()
+}
+
+/// A scene that a lamp of so much light alone lights, and the lamp's way.
+struct Subject {
+    scene: Scene,
+    lower: Vec3,
+    size: Vec3,
+    is_spot: bool,
+    start: Vec3,
+    step: Vec3,
+}
+
+impl Subject {
+    fn new((address, is_spot, start, step): (&str, bool, Vec3, Vec3)) -> Result<Self> {
+        let mut scene = scene::load(address)?;
+        for material in &mut scene.materials {
+            material.emission = Vec3::ZERO;
+        }
+        scene.lights.clear();
+        scene.environment = None;
+        let [lower, upper] = SceneProfile::of(&scene)
+            .bounds
+            .unwrap_or_default()
+            .map(|corner| DVec3::from_array(corner).as_vec3());
+        let mut subject = Self {
+            scene,
+            lower,
+            size: upper - lower,
+            is_spot,
+            start,
+            step,
+        };
+        let kind = subject.lamp(0);
+        subject.scene.add_light("lamp", kind);
+        Ok(subject)
+    }
+
+    /// The lamp in a frame. A spot is directed upwards, and turns to one side as it goes.
+    fn lamp(&self, frame: u32) -> LightKind {
+        let position = self.lower + self.size * (self.start + frame as f32 * self.step);
+        let intensity = Vec3::splat(self.size.length_squared());
+        if self.is_spot {
+            LightKind::Spot {
+                position,
+                direction: Vec3::new(0.02 * frame as f32, 1.0, 0.2).normalize(),
+                intensity,
+                inner: 0.5,
+                outer: 0.9,
+            }
+        } else {
+            LightKind::Point { position, intensity }
+        }
+    }
+}
+
+fn renderer(
+    gpu: &Gpu,
+    scene: &Arc<GpuScene>,
+    subject: &Subject,
+    settings: ManyLightSettings,
+    form: Form,
+) -> Result<ManyLight> {
+    ManyLight::new(
+        gpu,
+        Arc::clone(scene),
+        &subject.scene.cameras[0],
+        [form.side; 2],
+        settings,
+    )
+}
+
+/// A frame that begins a picture, and its milliseconds of wall clock.
+fn frame(renderer: &mut ManyLight, subject: &Subject, seed: Option<u32>) -> Result<(Vec<f32>, f64)> {
+    match seed {
+        Some(seed) => renderer.restart(seed)?,
+        None => renderer.set_camera(&subject.scene.cameras[0])?,
+    }
+    let clock = Instant::now();
+    while renderer.step(1)?.is_some() {}
+    let milliseconds = 1e3 * clock.elapsed().as_secs_f64();
+    let (picture, _) = renderer.picture()?;
+    Ok((picture.require(picture::RADIANCE)?.values().to_vec(), milliseconds))
+}
+
+/// Root of the mean squared difference, over the mean of the second.
+fn difference(a: &[f32], b: &[f32]) -> f64 {
+    let squares: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    let sum: f64 = b.iter().map(|value| f64::from(*value)).sum();
+    (squares * b.len() as f64).sqrt() / sum
+}
+
+/// What frames of a way have been.
+#[derive(Default)]
+struct Frames {
+    maps: Vec<f64>,
+    time: Vec<f64>,
+    error: Vec<f64>,
+    change: Vec<f64>,
+    renewed: u64,
+    last: Vec<f32>,
+}
+
+fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) -> Result<(Vec<Row>, Still)> {
+    let form = context.pick(FULL, SMOKE);
+    let subject = Subject::new(case)?;
+    let scene = Arc::new(GpuScene::new(gpu, &subject.scene)?);
+    let base = ManyLightSettings {
+        lights: form.lights,
+        visibility: Visibility::Maps,
+        map_side: form.map_side,
+        renewed: RENEWED,
+        path_set: INDIRECT.parse()?,
+        ..ManyLightSettings::default()
+    };
+    let of_way = |placement| {
+        let settings = ManyLightSettings {
+            placement,
+            ..base.clone()
+        };
+        renderer(gpu, &scene, &subject, settings, form)
+    };
+    let mut renderers = [of_way(WAYS[0].1)?, of_way(WAYS[1].1)?];
+    let oracle = ManyLightSettings {
+        lights: form.oracle,
+        visibility: Visibility::Rays,
+        ..base.clone()
+    };
+    let mut oracle = renderer(gpu, &scene, &subject, oracle, form)?;
+    let mut found = [Frames::default(), Frames::default()];
+    // The first frame, of all lights, compiles kernels and does not count.
+    for number in 0..=form.frames {
+        scene.move_light(gpu, 0, &subject.lamp(number))?;
+        let truth = match number {
+            0 => None,
+            number if number % form.every == 0 => Some(frame(&mut oracle, &subject, Some(ORACLE_SEED + number))?.0),
+            _ => None,
+        };
+        for turn in 0..WAYS.len() {
+            let way = (turn + number as usize) % WAYS.len();
+            let (renderer, frames) = (&mut renderers[way], &mut found[way]);
+            let before = renderer.counts();
+            let seed = (WAYS[way].1 == Placement::Walks).then_some(number);
+            let (radiance, milliseconds) = frame(renderer, &subject, seed)?;
+            let after = renderer.counts();
+            if number > 0 {
+                frames.maps.push((after.maps - before.maps) as f64);
+                frames.time.push(milliseconds);
+                frames.change.push(difference(&frames.last, &radiance));
+                frames
+                    .error
+                    .extend(truth.as_ref().map(|truth| difference(&radiance, truth)));
+                frames.renewed = frames.renewed.max(after.renewed - before.renewed);
+            }
+            frames.last = radiance;
+        }
+    }
+    // Until all is settled, and then frames that count.
+    let still = &mut renderers[0];
+    for _ in 0..form.lights {
+        let before = still.counts().renewed;
+        frame(still, &subject, None)?;
+        if still.counts().renewed == before {
+            break;
+        }
+    }
+    let before = still.counts();
+    for _ in 0..STILL {
+        frame(still, &subject, None)?;
+    }
+    let after = still.counts();
+    let name = short_name(case.0).to_owned();
+    let rows = WAYS.iter().zip(found).map(|((way, _), frames)| Row {
+        scene: name.clone(),
+        way: (*way).into(),
+        renewed: frames.renewed,
+        maps: Repeats(frames.maps),
+        time: Repeats(frames.time),
+        error: Repeats(frames.error),
+        change: Repeats(frames.change),
+    });
+    let still = Still {
+        scene: name.clone(),
+        lights: after.renewed - before.renewed,
+        rays: after.sight_rays - before.sight_rays,
+        maps: after.maps - before.maps,
+    };
+    Ok((rows.collect(), still))
+}
+
+impl Study for Found {
+    fn measure(context: &Context<'_>) -> Result<Self> {
+        let gpu = (context.gpu)()?;
+        let mut still = Vec::new();
+        let moving = context.each(
+            context.first(&SCENES, 1),
+            |(address, ..)| short_name(address).to_owned(),
+            |case| {
+                let (rows, of_case) = of_scene(context, &gpu, *case)?;
+                still.push(of_case);
+                Ok(rows)
+            },
+        )?;
+        Ok(Self { moving, still })
+    }
+
+    fn findings(&self) -> Findings {
+        let pairs = pairs(&self.moving);
+        Findings::of(&pairs, OF_PAIRS)
+            .headline(
+                "time of frames with new walks over that of frames with kept lights, geometric mean of three scenes",
+                geometric_mean(pairs.iter().map(|pair| pair.faster)),
+            )
+            .and(Findings::of(&self.still, OF_STILL))
+            .and(Findings::of(&self.moving, &[]))
+            .note(format!(
+                "{0} × {0} pixels, {1} virtual lights with exact maps of {2}² texels, four by four tiles and their filter; {3} frames in which the lamp goes on, behind a first one that places all lights. \
+                 Ways take turns in each frame. A frame is wall clock, with the host's triangulations; new walks have another seed in each frame. Both ways have the bound and the filter of \
+                 the defaults; the oracle's bound is that of its many lights, so that errors hold what bounds leave out.",
+                FULL.side, FULL.lights, FULL.map_side, FULL.frames,
+            ))
+    }
+}
