@@ -4,6 +4,7 @@ pub mod arguments;
 pub mod carousel;
 pub mod lettering;
 pub mod live_map;
+pub mod live_photons;
 pub mod orbit;
 pub mod panels;
 pub mod progressive;

@@ -517,6 +517,96 @@ fn the_photon_viewer_refuses_what_it_cannot_show() {
     assert!(said(&output).contains("directional light"), "{}", said(&output));
 }
 
+/// A picture of photons in media without a window, and what was said.
+fn volume_photons(arguments: &[&str]) -> (image::RgbImage, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new folder/picture.png");
+    let small = ["--size", "40x40", "--photons", "4096", "--frames", "4"];
+    let output = ["--picture", path.to_str().unwrap()];
+    let output = run(
+        env!("CARGO_BIN_EXE_volume_photons"),
+        &[&small[..], arguments, &output].concat(),
+    );
+    (open(&path), said(&output))
+}
+
+#[test]
+fn photons_in_media_have_the_same_light_by_every_estimate() {
+    let [march, ray, beams] = ["march", "ray", "beams"].map(|volume| {
+        let (picture, text) = volume_photons(&["--volume", volume]);
+        assert_eq!(picture.dimensions(), (40, 40));
+        assert!(
+            text.contains(&format!("{volume}, ")) && text.contains(" mm wide"),
+            "{text}"
+        );
+        // Walls as in the Cornell box, behind fog that is lit by a white lamp.
+        let [red, green] = [[0.04, 0.14], [0.86, 0.96]].map(|across| mean(&picture, across, [0.3, 0.7]));
+        assert!(red[0] > 1.2 * red[1] && green[1] > 1.1 * green[0], "{red:?} {green:?}");
+        mean(&picture, [0.0, 1.0], [0.0, 1.0])
+    });
+    // But for noise and blur, of which balls lose most by walls.
+    for other in [march, beams] {
+        for channel in 0..3 {
+            let ratio = other[channel] / ray[channel];
+            assert!((ratio - 1.0).abs() < 0.1, "{march:?} {ray:?} {beams:?}");
+        }
+    }
+    // The same frames again are the same picture.
+    let again = || volume_photons(&["--volume", "ray", "--turn", "20"]).0;
+    assert!(again() == again());
+}
+
+#[test]
+fn the_lamp_in_the_fog_goes_around_and_keys_change_the_estimate() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    let shown = |arguments: &[&str]| {
+        let small = ["--size", "40x40", "--photons", "2048"];
+        let output = windowed(
+            env!("CARGO_BIN_EXE_volume_photons"),
+            &[&small[..], arguments].concat(),
+            &path,
+        );
+        assert!(output.status.success(), "{}", said(&output));
+        // The ceiling above the lamp, whose circle begins at the left of the picture.
+        let sides = [[0.15, 0.45], [0.55, 0.85]].map(|across| mean(&open(&path), across, [0.04, 0.2])[1]);
+        (sides, said(&output))
+    };
+    let [(first, _), (third, text)] = ["1", "3"].map(|frames| shown(&["--turn", "90", "--frames", frames]));
+    assert!(
+        first[0] > 1.1 * first[1] && third[1] > 1.1 * third[0],
+        "{first:?} {third:?}"
+    );
+    for expected in ["ray, ", "kernels a ray", "medians of 2 frames", "photons/s"] {
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+    for (volume, keys, expected) in [("march", "ee", "beams, "), ("beams", "E", "march, ")] {
+        let (_, text) = shown(&["--volume", volume, "--keys", keys, "--frames", "2"]);
+        assert!(text.contains(expected), "{text}");
+    }
+}
+
+#[test]
+fn photons_in_media_are_refused_what_they_cannot_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.png");
+    for (arguments, expected) in [
+        (&["--volume", "foggy"][..], "foggy"),
+        (&["--photons", "many"], "many"),
+        (&["--radius", "-1"], "volume_radius"),
+        (&["--turn", "3", "builtin:fog-box"], "directional light"),
+        (&["builtin:smoke", "--volume", "beams"], "homogeneous"),
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_volume_photons"))
+            .args(arguments)
+            .args(["--picture", path.to_str().unwrap(), "--size", "8x8"])
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(said(&output).contains(expected), "{}", said(&output));
+    }
+}
+
 /// A picture of the octahedron lab without a window, and what it said.
 fn octahedron_lab(arguments: &[&str]) -> (image::RgbImage, String) {
     let folder = tempfile::tempdir().unwrap();

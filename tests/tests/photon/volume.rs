@@ -11,6 +11,7 @@ use clerestory_tests::render::{builtin, cuboid, medium, quad};
 use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::{gpu, with_gpu};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_EVENTS_HASH";
@@ -273,6 +274,46 @@ fn ways_have_fewer_pieces_where_a_device_cannot_hold_all() {
             variance: 0.0,
         };
         found.expect("beams of a pass", 0, 0, expected, 3e-3);
+    });
+}
+
+#[test]
+fn ways_have_all_their_pieces_again_after_a_restart() {
+    with_gpu(|gpu| {
+        let scene = airlight(0.0, 2.0, 1.0);
+        let light_at = |z: f32| {
+            let mut kind = scene.lights[0].kind;
+            if let LightKind::Point { position, .. } = &mut kind {
+                position.z = z;
+            }
+            kind
+        };
+        let settings = PhotonSettings {
+            photons: 140_000,
+            ..single(VolumeEstimate::Beams, 0.01)
+        };
+        let uploaded = upload(gpu, &scene);
+        let fresh = || {
+            let (scene, camera) = (Arc::clone(&uploaded), &scene.cameras[0]);
+            PhotonMapper::new(gpu, scene, camera, SIZE, settings.clone()).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let pieces = |mapper: &mut PhotonMapper| {
+            let before = mapper.counts().photons.events;
+            mapper.photons(0).unwrap_or_else(|error| panic!("{error}"));
+            mapper.counts().photons.events - before
+        };
+        // Far away from the wall all ways would have 32 pieces, more than the least that a device must be able to bind.
+        let mut mapper = fresh();
+        let move_to = |z: f32| uploaded.move_light(gpu, 0, &light_at(z));
+        move_to(-1e3).unwrap_or_else(|error| panic!("{error}"));
+        let caps = gpu.caps();
+        let most = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16) / 2;
+        let all = 32 * u64::from(settings.photons);
+        assert_eq!(pieces(&mut mapper), if all > most { all / 2 } else { all });
+        // Close to it half of them end there, and there is room for all.
+        move_to(3.99).unwrap_or_else(|error| panic!("{error}"));
+        mapper.restart(settings.seed).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(pieces(&mut mapper), pieces(&mut fresh()));
     });
 }
 

@@ -274,6 +274,7 @@ impl PhotonMapper {
     fn begin(&mut self) {
         if let Some(photons) = &mut self.photons {
             (photons.tracing, photons.map, photons.events) = (None, None, None);
+            photons.tracer.restart();
         }
     }
 

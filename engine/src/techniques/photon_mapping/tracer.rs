@@ -362,6 +362,13 @@ impl PhotonTracer {
         })
     }
 
+    /// Forgets what it has learnt of earlier passes, but for the memory that they have needed.
+    pub fn restart(&mut self) {
+        if let Some(volume) = &mut self.kit.volume {
+            volume.restart();
+        }
+    }
+
     /// Goes on with another seed.
     pub fn set_seed(&mut self, seed: u32) {
         self.plan.seed = seed;

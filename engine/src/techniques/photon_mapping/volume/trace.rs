@@ -279,6 +279,11 @@ impl VolumeTrace {
         self.capacity
     }
 
+    /// Ways have all their pieces again, whatever there has been room for: another beginning is that of another mapper.
+    pub fn restart(&mut self) {
+        self.pieces_most = WAY_PIECES;
+    }
+
     /// Makes room for so many events, or for half the pieces of each way where the device cannot hold as many.
     ///
     /// # Errors
