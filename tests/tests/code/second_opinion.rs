@@ -14,10 +14,7 @@ use clerestory::gpu::ash::vk;
 use clerestory::gpu::interface::ShaderInfo;
 use spirv_reflect::ffi;
 
-#[path = "../../../engine/build/reflect.rs"]
-mod reflect;
-
-use reflect::{Member, Resource, Type};
+use super::shader_build::build::reflect::{self, Member, Resource, Type};
 
 fn folder(below: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(below)

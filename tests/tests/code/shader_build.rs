@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// The part of the build script that is tested, with what it rests on.
 #[path = "../../../engine/build"]
-mod build {
+pub(super) mod build {
     pub mod compile;
     pub mod generate;
     pub mod reflect;
