@@ -16,7 +16,7 @@ trap 'rm -r "$beside"' EXIT
 cp "$beside/render_gltf.png" "$out/"
 xvfb-run -a "$samples/viewer" 'builtin:cornell-box?sphere=gold' --size 180x180 --exposure 0.5 --frames 400 --screenshot "$out/viewer.png"
 xvfb-run -a "$samples/photon_viewer" --size 240x180 --photons 131072 --spread 16 --exposure -1.5 --frames 12 --screenshot "$out/photon_viewer.png"
-"$samples/volume_photons" --picture "$out/volume_photons.png" --size 240x240 --photons 65536 --volume beams --frames 48
+"$samples/volume_photons" --picture "$out/volume_photons.png" --size 240x240 --photons 65536 --volume ray --frames 8
 xvfb-run -a "$samples/many_lights" --size 180x180 --lights 512 --turn 12 --frames 16 --screenshot "$out/many_lights.png"
 "$samples/octahedron_lab" --output "$out/octahedron_lab.png" --size 1000x400 --channel distance --against cube
 "$samples/reflection_preview" --output "$out/reflection_preview.png" --size 240x180 --samples 4 --shadow 1024 --frames 5

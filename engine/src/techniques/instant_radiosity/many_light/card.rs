@@ -376,7 +376,7 @@ const ROWS: &[Row] = &[
         ],
         api: &["clerestory::techniques::instant_radiosity::incremental"],
         settings: &["placement", "renewed"],
-        ..Row::of("engine/src/techniques/instant_radiosity/incremental/mod.rs")
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/kept.rs")
     },
     Row {
         id: "SVO-B0",
