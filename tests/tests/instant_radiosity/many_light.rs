@@ -43,6 +43,18 @@ fn of(set: &str, settings: ManyLightSettings) -> ManyLightSettings {
     }
 }
 
+/// Lights and tiles that leave a rest when they are shared out.
+fn of_odd_sizes(visibility: Visibility, settings: ManyLightSettings) -> ManyLightSettings {
+    ManyLightSettings {
+        visibility,
+        map_side: 16,
+        map_points: 256,
+        interleave: 3,
+        lights: 50,
+        ..settings
+    }
+}
+
 fn frames(gpu: &Gpu, scene: &Scene, size: [u32; 2], settings: &ManyLightSettings) -> ManyLight {
     match ManyLight::new(gpu, upload(gpu, scene), &scene.cameras[0], size, settings.clone()) {
         Ok(frames) => frames,
@@ -170,14 +182,7 @@ fn frames_do_not_depend_on_how_work_is_shared_out() {
     with_gpu(|gpu| {
         let scene = hall();
         for visibility in [Visibility::Rays, Visibility::Maps, Visibility::Imperfect] {
-            let base = ManyLightSettings {
-                visibility,
-                map_side: 16,
-                map_points: 256,
-                interleave: 3,
-                lights: 50,
-                ..exact()
-            };
+            let base = of_odd_sizes(visibility, exact());
             let all = |settings: &ManyLightSettings| {
                 let mut renderer = frames(gpu, &scene, [13, 7], settings);
                 let radiance = bits(&advance(&mut renderer, 2)[0]);

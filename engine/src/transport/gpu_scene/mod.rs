@@ -314,6 +314,20 @@ impl GpuScene {
         })
     }
 
+    /// As [`index_within`](Self::index_within), for kernels that ask about candidates where surfaces let light through in places: lanes that ask wait for each other.
+    ///
+    /// # Errors
+    /// As there, and for quotas that are too small once lanes wait.
+    pub fn filtered_index_within(&self, gpu: &Gpu, steps: u32) -> Result<IndexWithin> {
+        let within = self.index_within(gpu, steps)?;
+        if !self.profile.has_alpha() {
+            return Ok(within);
+        }
+        let quota = (steps / gpu.caps().subgroup_size.max(1)).min(within.quota);
+        let quota = self.index.traversal.quota_within(gpu.caps(), quota, steps, true)?;
+        Ok(IndexWithin { quota, ..within })
+    }
+
     /// Least and greatest corner, world space, metres.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.bounds

@@ -274,14 +274,7 @@ fn kept_lights_do_not_depend_on_how_work_is_shared_out() {
     with_gpu(|gpu| {
         let at = |step: u32| point(Vec3::new(0.5 - 0.2 * step as f32, 1.7, 0.2));
         for visibility in [Visibility::Rays, Visibility::Maps, Visibility::Imperfect] {
-            let base = ManyLightSettings {
-                visibility,
-                map_side: 16,
-                map_points: 256,
-                interleave: 3,
-                lights: 50,
-                ..kept()
-            };
+            let base = of_odd_sizes(visibility, kept());
             let all = |settings: ManyLightSettings| -> Vec<Vec<u32>> {
                 let mut moving = Moving::new(gpu, lit_by(hall(), &[at(0)]), [13, 7], settings);
                 (0..4).map(|step| bits(&moving.frame(at(step)).0)).collect()

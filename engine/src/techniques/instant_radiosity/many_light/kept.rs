@@ -126,18 +126,11 @@ impl KeptLights {
         }
         // The rest is for what a ray finds.
         let each = SOFTWARE_LOOP_CAP / 2;
-        let (index, filters) = (scene.index_within(gpu, each)?, scene.profile().has_alpha());
-        let index_quota = if filters {
-            // Lanes that ask about candidates wait for each other.
-            let quota = (each / gpu.caps().subgroup_size.max(1)).min(index.quota);
-            scene.index_traversal().quota_within(gpu.caps(), quota, each, true)?
-        } else {
-            index.quota
-        };
+        let (index, filters) = (scene.filtered_index_within(gpu, each)?, scene.profile().has_alpha());
         let rays = surface_spec!(kept_rays, scene, {
             has_multiple_scattering: false,
             has_alpha: filters,
-            index_quota,
+            index_quota: index.quota,
             index_kind: index.kind,
             ..Default::default()
         });

@@ -125,14 +125,7 @@ impl Direct {
     pub fn new(gpu: &Gpu, scene: &GpuScene, settings: &ManyLightSettings, pixels: u32) -> Result<Self> {
         // Two thirds for the two rays, the rest for the choice of a light.
         let each = SOFTWARE_LOOP_CAP / 3;
-        let (index, filters) = (scene.index_within(gpu, each)?, scene.profile().has_alpha());
-        let index_quota = if filters {
-            // Lanes that ask about candidates wait for each other.
-            let quota = (each / gpu.caps().subgroup_size.max(1)).min(index.quota);
-            scene.index_traversal().quota_within(gpu.caps(), quota, each, true)?
-        } else {
-            index.quota
-        };
+        let (index, filters) = (scene.filtered_index_within(gpu, each)?, scene.profile().has_alpha());
         let spec = surface_spec!(deferred_direct, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
             separable_masking: false,
@@ -144,7 +137,7 @@ impl Direct {
             sampler_kind: settings.sampler as u32,
             shows_emitted: settings.shows(0),
             shows_direct: settings.shows(1) && scene.has_lights(),
-            index_quota,
+            index_quota: index.quota,
             index_kind: index.kind,
             ..Default::default()
         });
