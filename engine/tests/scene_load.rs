@@ -288,6 +288,7 @@ fn several_media_find_their_places() {
         absorbs: true,
         scatters: true,
         emits: true,
+        emits_endlessly: false,
         chromatic: true,
         // What does not scatter has no use for its phase function.
         phases: PhaseUse {

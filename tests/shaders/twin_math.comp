@@ -13,6 +13,7 @@ const bool SEPARABLE_MASKING = false;
 #include "film/two_float.glsl"
 #include "techniques/bidirectional/bdpt_mis.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
+#include "techniques/instant_radiosity/resampling.glsl"
 #include "transport/edge_bound.glsl"
 #include "transport/fresnel.glsl"
 #include "transport/ggx.glsl"
@@ -189,6 +190,14 @@ void main() {
         out2(2u, vec2(scattered.d_vcm, scattered.d_vc));
         out2(4u, vec2(mirrored.d_vcm, mirrored.d_vc));
         out2(6u, vec2(mis_behind(w, in1(6u)), mis_weight(in1(0u), in1(1u))));
+        break;
+    }
+    case 17u: {  // eight candidates, one after the other
+        float sum = 0.0;
+        for (uint i = 0u; i < 8u; ++i) {
+            out_bits(i, resample(in1(2u * i), in1(2u * i + 1u), sum) ? 1u : 0u);
+            out1(8u + i, sum);
+        }
         break;
     }
     }

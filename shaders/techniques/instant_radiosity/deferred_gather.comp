@@ -21,7 +21,6 @@ layout(local_size_x = 64) in;
 #include "wide_counter.glsl"
 
 layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;  // of a place, in a dispatch
-layout(constant_id = 143) const uint VISIBILITY = VISIBILITY_RAYS;
 layout(constant_id = 144) const bool KEEPS_COLORS = false;  // by which a filter divides light before it averages it
 
 layout(push_constant, scalar) uniform Push {

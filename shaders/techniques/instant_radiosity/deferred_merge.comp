@@ -13,14 +13,11 @@
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
-#include "maps/packed_direction.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/split_place.glsl"
 
 layout(constant_id = 145) const bool FILTERS = true;
 layout(constant_id = 146) const bool ADDS = true;  // to what the picture has already
-
-const uint SHADING_NORMAL_BITS = 16u;  // of each coordinate, as Output::Normals has them
 
 layout(push_constant, scalar) uniform Push {
     uint width;
@@ -41,6 +38,8 @@ layout(set = 0, binding = 2) uniform sampler2D seen_positions;  // w is 0 where 
 layout(set = 0, binding = 3) uniform usampler2D seen_normals;
 layout(set = 0, binding = 4, scalar) restrict buffer Radiance { vec3 radiance[]; };
 
+#include "techniques/instant_radiosity/seen_surface.glsl"
+
 // What a place has of all lights, by its subset of them.
 vec3 merged(uint place) {
     uint tile = place / interleave_stride(uvec2(push.width, push.height), push.interleave);
@@ -56,8 +55,6 @@ vec3 alike(vec3 a, vec3 b) { return vec3(equal(greaterThan(a, vec3(0.0)), greate
 
 // Of a pixel that is so far from the middle of the window along an axis.
 float window_weight(int offset) { return 2 * abs(offset) == int(push.interleave) ? 0.5 : 1.0; }
-
-vec3 seen_normal(ivec2 pixel) { return unpack_octahedral(texelFetch(seen_normals, pixel, 0).y, SHADING_NORMAL_BITS); }
 
 vec3 filtered(uvec2 pixel) {
     uvec2 size = uvec2(push.width, push.height);
@@ -80,9 +77,7 @@ vec3 filtered(uvec2 pixel) {
         if (offset == ivec2(0) || any(lessThan(other, ivec2(0))) || any(greaterThanEqual(other, ivec2(size)))) {
             continue;
         }
-        vec4 there = texelFetch(seen_positions, other, 0);
-        bool is_near = there.w != 0.0 && abs(dot(normal, there.xyz - position.xyz)) <= push.plane_max;
-        if (is_near && dot(normal, seen_normal(other)) > push.normal_min) {
+        if (is_same_surface(position.xyz, normal, other, push.plane_max, push.normal_min)) {
             uint neighbour = interleave_split(uvec2(other), size, push.interleave);
             vec3 counts = window_weight(offset.x) * window_weight(offset.y) * alike(color, split_colors[neighbour]);
             differences += counts * (merged(neighbour) / divisor(split_colors[neighbour]) - middle);

@@ -31,7 +31,7 @@ void pack_virtual_light(VirtualLight light, out uvec4 quarters[VIRTUAL_LIGHT_QUA
     uvec3 surface = floatBitsToUint(light.surface);
     quarters[0] = uvec4(floatBitsToUint(light.position), light.triangle);
     quarters[1] = floatBitsToUint(vec4(light.normal, light.offset));
-    quarters[2] = uvec4(floatBitsToUint(light.power), way.x);
+    quarters[LIGHT_POWER_QUARTER] = uvec4(floatBitsToUint(light.power), way.x);
     // By Lambert's law the way does not matter beyond its side.
     quarters[3] = uvec4(surface.xy, LAMBERT ? surface.z : way.y, light.bounce);
 }

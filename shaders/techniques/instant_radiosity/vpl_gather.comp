@@ -25,6 +25,7 @@ layout(local_size_x = 64) in;
 #include "transport/random.glsl"
 #include "techniques/instant_radiosity/gather_place.glsl"
 #include "techniques/instant_radiosity/potential_bins.glsl"
+#include "techniques/instant_radiosity/resampling.glsl"
 #include "transport/luminance.glsl"
 #include "walk/candidate_alpha.glsl"
 
@@ -84,8 +85,7 @@ vec3 resampled_connection(Receiver r, uint place, vec3 normal, out Ray ray) {
         Ray way;
         vec3 found = counted_connection(r, load_virtual_light(number), way) / probability;
         float weight = dot(found, LUMINANCE.rgb);
-        sum += weight;
-        if (unit_float(words.z) * sum < weight) {
+        if (resample(unit_float(words.z), weight, sum)) {
             kept = found;
             of_kept = weight;
             ray = way;

@@ -2,7 +2,9 @@
 
 mod discs;
 mod kept;
+mod metropolis;
 mod reflective;
+mod reservoirs;
 mod tiles;
 
 use std::collections::BTreeSet;
@@ -11,7 +13,9 @@ use super::*;
 use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{AlphaMode, Camera, Environment};
-use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Placement, Visibility};
+use clerestory::techniques::instant_radiosity::many_light::{
+    Gathering, ManyLight, ManyLightSettings, Placement, Visibility,
+};
 use clerestory_hard_cases::scenes::orthographic;
 use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::{camera_down, floor};
@@ -478,6 +482,17 @@ fn prints_its_hash_when_asked() {
             ..exact()
         };
         all.extend(bits(&picture(gpu, &furnished(), [13, 7], &settings, 1)));
+        let settings = ManyLightSettings {
+            gathering: Gathering::Reservoirs,
+            candidates: 5,
+            ..exact()
+        };
+        all.extend(bits(&picture(gpu, &furnished(), [13, 7], &settings, 1)));
+        let settings = ManyLightSettings {
+            placement: Placement::Metropolis,
+            ..exact()
+        };
+        all.extend(bits(&picture(gpu, &hall(), [13, 7], &settings, 1)));
         print_hash(all);
     });
 }

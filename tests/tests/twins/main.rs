@@ -18,6 +18,7 @@ mod random;
 mod raster;
 mod reflection;
 mod reflective;
+mod resampling;
 mod scattering;
 mod searches;
 mod shadows;

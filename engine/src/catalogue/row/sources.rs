@@ -21,6 +21,7 @@ sources! {
     ASHKIANI_2016 = "ashkiani-2016": "S. Ashkiani, A. Davidson, U. Meyer, J. Owens", "GPU Multisplit", "PPoPP", 2016;
     BECKMANN_SPIZZICHINO_1963 = "beckmann-spizzichino-1963": "P. Beckmann, A. Spizzichino", "The Scattering of Electromagnetic Waves from Rough Surfaces", "Pergamon Press", 1963;
     BELLMAN_1961 = "bellman-1961": "R. Bellman", "On the Approximation of Curves by Line Segments Using Dynamic Programming", "CACM 4(6)", 1961;
+    BITTERLI_2020 = "bitterli-2020": "B. Bitterli et al.", "Spatiotemporal Reservoir Resampling for Real-Time Ray Tracing with Dynamic Direct Lighting", "SIGGRAPH", 2020;
     BJORKE_2004 = "bjorke-2004": "K. Bjorke", "Image-Based Lighting", "GPU Gems", 2004;
     BLASI_1993 = "blasi-1993": "P. Blasi, B. Le Saëc, C. Schlick", "A Rendering Algorithm for Discrete Volume Density Objects", "CGF 12(3)", 1993;
     BLELLOCH_1990 = "blelloch-1990": "G. Blelloch", "Prefix Sums and Their Applications", "CMU-CS-90-190", 1990;
@@ -91,6 +92,7 @@ sources! {
     KARRAS_2012 = "karras-2012": "T. Karras", "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees", "HPG", 2012;
     KAUTZ_2000 = "kautz-2000": "J. Kautz, P.-P. Vázquez, W. Heidrich, H.-P. Seidel", "A Unified Approach to Prefiltered Environment Maps", "EGWR", 2000;
     KAY_KAJIYA_1986 = "kay-kajiya-1986": "T. Kay, J. Kajiya", "Ray Tracing Complex Scenes", "SIGGRAPH", 1986;
+    KELEMEN_2002 = "kelemen-2002": "C. Kelemen, L. Szirmay-Kalos, G. Antal, F. Csonka", "A Simple and Robust Mutation Strategy for the Metropolis Light Transport Algorithm", "Eurographics", 2002;
     KELEMEN_SZIRMAY_KALOS_2001 = "kelemen-szirmay-kalos-2001": "C. Kelemen, L. Szirmay-Kalos", "A Microfacet Based Coupled Specular-Matte BRDF Model", "Eurographics short papers", 2001;
     KELLER_1997 = "keller-1997": "A. Keller", "Instant Radiosity", "SIGGRAPH", 1997;
     KELLER_HEIDRICH_2001 = "keller-heidrich-2001": "A. Keller, W. Heidrich", "Interleaved Sampling", "EGWR", 2001;
@@ -116,7 +118,9 @@ sources! {
     LAMBERT_1760 = "lambert-1760": "J. H. Lambert", "Photometria", "", 1760;
     LAUTERBACH_2009 = "lauterbach-2009": "C. Lauterbach et al.", "Fast BVH Construction on GPUs", "Eurographics", 2009;
     LAZANYI_SZIRMAY_KALOS_2005 = "lazanyi-szirmay-kalos-2005": "I. Lazányi, L. Szirmay-Kalos", "Fresnel Term Approximations for Metals", "WSCG short papers", 2005;
+    LIN_2022 = "lin-2022": "D. Lin et al.", "Generalized Resampled Importance Sampling: Foundations of ReSTIR", "SIGGRAPH", 2022;
     LIN_YUKSEL_2020 = "lin-yuksel-2020": "D. Lin, C. Yuksel", "Real-Time Stochastic Lightcuts", "I3D", 2020;
+    LIU_2000 = "liu-2000": "J. Liu, F. Liang, W. Wong", "The Multiple-Try Method and Local Optimization in Metropolis Sampling", "JASA 95", 2000;
     MEISTER_BITTNER_2018 = "meister-bittner-2018": "D. Meister, J. Bittner", "Parallel Reinsertion for Bounding Volume Hierarchy Optimization", "CGF 37(2)", 2018;
     MEYER_2010 = "meyer-2010": "Q. Meyer et al.", "On Floating-Point Normal Vectors", "EGSR", 2010;
     MIKKELSEN_2008 = "mikkelsen-2008": "M. S. Mikkelsen", "Simulation of Wrinkled Surfaces Revisited", "Master's thesis, University of Copenhagen", 2008;
@@ -143,6 +147,7 @@ sources! {
     SCHJOTH_2007 = "schjoth-2007": "L. Schjøth, J. Frisvad, K. Erleben, J. Sporring", "Photon Differentials", "GRAPHITE", 2007;
     SCHLICK_1994 = "schlick-1994": "C. Schlick", "An Inexpensive BRDF Model for Physically-based Rendering", "Eurographics", 1994;
     SEGOVIA_2006 = "segovia-2006": "B. Segovia, J.-C. Iehl, R. Mitanchey, B. Péroche", "Non-interleaved Deferred Shading of Interleaved Sample Patterns", "Graphics Hardware", 2006;
+    SEGOVIA_2007 = "segovia-2007": "B. Segovia, J.-C. Iehl, B. Péroche", "Metropolis Instant Radiosity", "Eurographics", 2007;
     SENGUPTA_2007 = "sengupta-2007": "S. Sengupta, M. Harris, Y. Zhang, J. Owens", "Scan Primitives for GPU Computing", "Graphics Hardware", 2007;
     SHIRLEY_1996 = "shirley-1996": "P. Shirley, C. Wang, K. Zimmerman", "Monte Carlo Techniques for Direct Lighting Calculations", "ACM TOG 15(1)", 1996;
     SHIRLEY_1997 = "shirley-1997": "P. Shirley et al.", "A Practitioners' Assessment of Light Reflection Models", "Pacific Graphics", 1997;

@@ -7,6 +7,7 @@ mod gather;
 pub mod incremental;
 pub mod many_light;
 mod renderer;
+pub mod resampling;
 pub mod selection;
 mod settings;
 

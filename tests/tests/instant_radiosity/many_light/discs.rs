@@ -1,7 +1,7 @@
 //! Discs of reflective shadow maps, against virtual lights without visibility and against each other.
 
 use super::*;
-use clerestory::techniques::instant_radiosity::many_light::{Gathering, RsmSequence};
+use clerestory::techniques::instant_radiosity::many_light::RsmSequence;
 
 /// A floor and a wall at its side, both lit by a spot; seen is the wall, in front of which a panel stands on the floor if asked for.
 fn corner(has_panel: bool) -> Scene {

@@ -134,6 +134,7 @@ impl Technique for ManyLight {
             ("virtual_lights", c.lights),
             ("kept_lights_renewed", c.renewed),
             ("kept_lights_asked", c.sight_rays),
+            ("chain_rays", c.chain_rays),
             ("connections", c.connections),
             ("visibility_tests", c.visibility_tests),
             ("shadow_maps", c.maps),
@@ -179,9 +180,14 @@ impl Technique for ManyLight {
                 "virtual lights are kept from frame to frame",
             ),
             (
-                lights && !settings.filters(),
+                lights && !self.has_reservoirs() && !settings.filters(),
                 "filter of neighbouring pixels",
                 "it was not asked for, or all pixels have all lights",
+            ),
+            (
+                self.has_reservoirs(),
+                "tiles, and the filter of neighbouring pixels",
+                "pixels take their light from reservoirs",
             ),
             (true, "albedo, normal and depth", "frames hold only radiance"),
         ];
@@ -342,6 +348,34 @@ const ROWS: &[Row] = &[
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/discs.rs")
     },
     Row {
+        id: "CL-VPL-RESERVOIRS",
+        name: "reservoirs of virtual lights: one of some that each pixel draws, or of those that it and its neighbours keep, with one test of visibility",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Nothing is kept from frame to frame, and visibility is by a ray or none; errors of neighbouring pixels are alike, in spots of the neighbours' reach.",
+        sources: &[
+            sources::BITTERLI_2020.whole(),
+            sources::LIN_2022.whole(),
+            sources::TALBOT_2005.whole(),
+        ],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/deferred_resample.comp",
+            "shaders/techniques/instant_radiosity/deferred_reuse.comp",
+            "shaders/techniques/instant_radiosity/reservoir.glsl",
+            "shaders/techniques/instant_radiosity/resampling.glsl",
+        ],
+        bias: Some(Bias::Unbiased),
+        tests: &[
+            "tests/tests/instant_radiosity/many_light/reservoirs.rs::reservoirs_are_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/reservoirs.rs::one_light_is_kept_by_all",
+            "tests/tests/instant_radiosity/many_light/reservoirs.rs::candidates_and_neighbours_take_noise_away",
+            "tests/tests/instant_radiosity/many_light/reservoirs.rs::reservoirs_have_their_passes_alone",
+            "tests/tests/twins/resampling.rs::resampled_candidates_agree_with_their_twins",
+            "engine/src/techniques/instant_radiosity/resampling.rs::candidates_are_kept_by_their_shares",
+        ],
+        settings: &["gathering", "candidates", "neighbours", "neighbour_reach"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/reservoirs.rs")
+    },
+    Row {
         id: "SVO-G2",
         name: "incremental instant radiosity: virtual lights of points and spots that are kept from frame to frame, with shares of the power by Voronoi cells of their directions",
         role: Role::PartOf("SVO-P12"),
@@ -377,6 +411,37 @@ const ROWS: &[Row] = &[
         api: &["clerestory::techniques::instant_radiosity::incremental"],
         settings: &["placement", "renewed"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/kept.rs")
+    },
+    Row {
+        id: "SVO-G5",
+        name: "Metropolis instant radiosity: virtual lights of many walks that multiple-try chains choose by the power they send to the camera, each weighted to bring as much",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Chains choose among a pool of walks instead of making paths from the camera, so that a region no walk of the pool reaches stays dark in that frame; lights change from frame to frame and flicker.",
+        sources: &[
+            sources::SEGOVIA_2007.whole(),
+            sources::LIU_2000.whole(),
+            sources::KELEMEN_2002.whole(),
+            sources::SUN_2015.at("§2.2.5"),
+        ],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/metropolis.glsl",
+            "shaders/techniques/instant_radiosity/metropolis_state.glsl",
+            "shaders/techniques/instant_radiosity/metropolis_try.comp",
+            "shaders/techniques/instant_radiosity/metropolis_accept.comp",
+            "shaders/techniques/instant_radiosity/metropolis_lights.comp",
+        ],
+        bias: Some(Bias::Consistent(
+            "chains are finite, and a light's weight is one over a power measured at some pixels",
+        )),
+        tests: &[
+            "engine/src/techniques/instant_radiosity/many_light/metropolis.rs::tries_are_chosen_as_often_as_they_bring",
+            "tests/tests/instant_radiosity/many_light/metropolis.rs::chosen_lights_bring_all_that_the_pool_brings",
+            "tests/tests/instant_radiosity/many_light/metropolis.rs::chosen_lights_are_as_bright_as_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/metropolis.rs::chains_halve_the_error_of_as_many_walks_behind_a_wall",
+            "tests/tests/instant_radiosity/many_light/metropolis.rs::chains_are_begun_anew_and_refuse_what_they_cannot_measure",
+        ],
+        settings: &["placement", "pool", "tries", "mutations", "power_pixels"],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/metropolis.rs")
     },
     Row {
         id: "SVO-B0",

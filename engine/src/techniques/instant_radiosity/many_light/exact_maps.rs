@@ -39,7 +39,7 @@ impl ExactMaps {
         let bytes = size_of::<f32>() as u64 * u64::from(side) * u64::from(side);
         let most = match settings.placement {
             Placement::Incremental => SHADOW_MAPS_MAX,
-            Placement::Walks | Placement::Rsm => MAPS_AT_ONCE,
+            Placement::Walks | Placement::Rsm | Placement::Metropolis => MAPS_AT_ONCE,
         };
         let maps = maps_at_once(settings, bytes).min(most);
         let desc = OmniShadowDesc {

@@ -6,10 +6,11 @@ use glam::DVec2;
 
 use super::kernels::{Sight, seen_from};
 use super::maps::Maps;
+use super::metropolis::{Chains, Metropolis};
 use super::reflective::{LightView, Reflective};
 use super::renderer::{Indirect, LightSource, ManyLight};
 use crate::gpu::shaders::types::SeenFrom;
-use crate::gpu::{Access, Area, Recorder, Timings};
+use crate::gpu::{Access, Area, Pass, Recorder, Timings};
 use crate::raster::{DrawPart, View};
 use crate::scene::camera_frame::CameraFrame;
 use crate::techniques::instant_radiosity::gather::SWEEPS_A_LIGHT;
@@ -24,6 +25,8 @@ pub(super) struct Frame {
     from: SeenFrom,
     /// Virtual lights that have landed.
     lights: u32,
+    /// That choose them once it is known what is seen.
+    chains: Option<Box<Chains>>,
     /// Views that pixels gather from.
     views: u32,
     /// What was drawn is visible to compute shaders.
@@ -51,6 +54,8 @@ enum Stage {
     },
     /// What is seen, from that part on.
     Draw(usize),
+    /// Chains that choose virtual lights.
+    Chains,
     /// Light without virtual lights, from that pixel on.
     Direct(u32),
     /// The shadow maps from that light's part on, of lights from the first one on.
@@ -64,6 +69,10 @@ enum Stage {
         place: u32,
         sweeps: u64,
     },
+    /// Lights that pixels draw, from that one on.
+    Resample(u32),
+    /// Light of those that pixels and their neighbours keep, from that one on.
+    Reuse(u32),
     /// Back to the picture, from that pixel on.
     Merge(u32),
     Ended,
@@ -109,6 +118,10 @@ impl ManyLight {
                 ..
             }) => Stage::Walks(Box::new(tracer.begin(self.done, None))),
             Some(Indirect {
+                source: LightSource::Metropolis(chains),
+                ..
+            }) => Stage::Walks(Box::new(chains.tracer.begin(self.done, None))),
+            Some(Indirect {
                 source: LightSource::Kept(_),
                 ..
             }) => Stage::Kept,
@@ -120,6 +133,7 @@ impl ManyLight {
             view,
             from: seen_from(&camera, size),
             lights: 0,
+            chains: None,
             views: 0,
             is_shown: false,
             has_maps: false,
@@ -146,9 +160,12 @@ impl ManyLight {
             Stage::OnViews(views) => self.place_on_views(frame, views)?,
             Stage::Discs { view, pixel } => self.gather_discs(frame, view, pixel)?,
             Stage::Draw(part) => self.draw(frame, part)?,
+            Stage::Chains => self.choose(frame)?,
             Stage::Direct(pixel) => self.shade(frame, pixel)?,
             Stage::Maps { first, from } => self.draw_maps(frame, first, from)?,
             Stage::Gather { lights, place, sweeps } => self.gather(frame, lights, place, sweeps)?,
+            Stage::Resample(pixel) => self.resample(frame, pixel)?,
+            Stage::Reuse(pixel) => self.reuse(frame, pixel)?,
             Stage::Merge(pixel) => self.merge(frame, pixel)?,
             Stage::Ended => (Vec::new(), Stage::Ended),
         };
@@ -166,7 +183,8 @@ impl ManyLight {
     }
 
     fn walk(&mut self, frame: &mut Frame, mut tracing: Box<Tracing>) -> Result<(Vec<Timings>, Stage)> {
-        let Some(LightSource::Walks(tracer)) = self.indirect.as_mut().map(|indirect| &mut indirect.source) else {
+        let source = self.indirect.as_mut().map(|indirect| &mut indirect.source);
+        let Some(tracer) = source.and_then(LightSource::tracer) else {
             return Ok((Vec::new(), self.first_drawing()));
         };
         let all = tracer.advance(&mut tracing)?;
@@ -176,6 +194,10 @@ impl ManyLight {
         }
         let traced = tracing.into_traced();
         self.counts.walks += traced.counts;
+        if self.metropolis().is_some() && traced.records > 0 {
+            frame.chains = Some(Box::new(Chains::new(self.done, self.film.size(), traced.records)));
+            return Ok((timings, self.first_drawing()));
+        }
         Ok((timings, self.placed(frame, traced.records)?))
     }
 
@@ -206,6 +228,54 @@ impl ManyLight {
         // Where no light has landed, and nothing else is shown, nothing is drawn.
         let is_dark = lights == 0 && self.direct.is_none();
         Ok(if is_dark { Stage::Merge(0) } else { self.first_drawing() })
+    }
+
+    /// Chains that choose virtual lights, where these come from them.
+    fn metropolis(&self) -> Option<&Metropolis> {
+        match self.indirect.as_ref().map(|indirect| &indirect.source) {
+            Some(LightSource::Metropolis(chains)) => Some(chains),
+            _ => None,
+        }
+    }
+
+    /// A submission of the chains of a frame, and behind the last one the split picture.
+    fn choose(&mut self, frame: &mut Frame) -> Result<(Vec<Timings>, Stage)> {
+        let Some(mut chains) = frame.chains.take() else {
+            return Ok((Vec::new(), self.after_drawing(frame)));
+        };
+        let mut rays = 0;
+        let timings = self.submit(|own, recorder| {
+            let (Some(metropolis), Some(seen)) = (own.metropolis(), &own.seen) else {
+                return Ok(());
+            };
+            let sight = Sight {
+                scene: &own.scene,
+                seen,
+                from: frame.from,
+            };
+            rays = metropolis.record(recorder, &sight, &chains, frame.is_shown)?;
+            Ok(())
+        })?;
+        frame.is_shown = true;
+        self.counts.chain_rays += rays;
+        if let Some(metropolis) = self.metropolis() {
+            metropolis.learn(&self.gpu, &mut chains)?;
+        }
+        let Some(lights) = chains.ended() else {
+            frame.chains = Some(chains);
+            return Ok((timings, Stage::Chains));
+        };
+        self.placed(frame, lights)?;
+        Ok((timings, self.after_drawing(frame)))
+    }
+
+    /// What comes behind what is seen.
+    fn after_drawing(&self, frame: &Frame) -> Stage {
+        match (&self.direct, &frame.chains) {
+            (_, Some(_)) => Stage::Chains,
+            (Some(_), None) => Stage::Direct(0),
+            (None, None) => self.first_lights(frame, 0),
+        }
     }
 
     /// Reflective shadow maps, where virtual lights come from them.
@@ -288,7 +358,13 @@ impl ManyLight {
     fn draw(&mut self, frame: &mut Frame, part: usize) -> Result<(Vec<Timings>, Stage)> {
         let parts = self.parts.as_ref().map_or(0, Vec::len);
         let is_last = part + 1 >= parts;
-        let splits = is_last && frame.lights > 0;
+        // Chains choose as many as there are settings for.
+        let lights = match frame.chains {
+            Some(_) => self.settings.lights,
+            None => frame.lights,
+        };
+        let split = self.indirect.as_ref().and_then(Indirect::split);
+        let splits = is_last && lights > 0 && split.is_some();
         let timings = self.submit(|own, recorder| {
             let surfaces = own.scene.surfaces();
             let (Some(seen), Some(parts)) = (&own.seen, &own.parts) else {
@@ -296,19 +372,19 @@ impl ManyLight {
             };
             let views = std::slice::from_ref(&frame.view);
             seen.gbuffer.record_part(recorder, &surfaces, views, &parts[part])?;
-            match own.indirect.as_ref().filter(|_| splits) {
-                Some(indirect) => recorder.pass("many-light: split", |pass| {
+            match own.indirect.as_ref().filter(|_| splits).and_then(Indirect::split) {
+                Some(split) => recorder.pass("many-light: split", |pass| {
                     seen.show(pass);
-                    indirect.split.record_split(pass, seen, frame.lights)
+                    split.record_split(pass, seen, lights)
                 }),
                 None => Ok(()),
             }
         })?;
         frame.is_shown = splits;
-        let next = match (is_last, &self.direct) {
-            (false, _) => Stage::Draw(part + 1),
-            (true, Some(_)) => Stage::Direct(0),
-            (true, None) => self.first_lights(frame, 0),
+        let next = if is_last {
+            self.after_drawing(frame)
+        } else {
+            Stage::Draw(part + 1)
         };
         Ok((timings, next))
     }
@@ -358,10 +434,8 @@ impl ManyLight {
                     seen.show(pass);
                 }
                 // What the first view brings is added to direct light, or to nothing.
-                if view == 0 && first == 0 && own.direct.is_none() {
-                    pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_WRITE);
-                    pass.fill(own.radiance.view(), 0)?;
-                    pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+                if view == 0 && first == 0 {
+                    own.record_black(pass)?;
                 }
                 let sight = Sight {
                     scene: &own.scene,
@@ -383,6 +457,88 @@ impl ManyLight {
         Ok((timings, next))
     }
 
+    /// Where there is no direct light, nothing yet.
+    fn record_black(&self, pass: &mut Pass<'_>) -> Result<()> {
+        if self.direct.is_none() {
+            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_WRITE);
+            pass.fill(self.radiance.view(), 0)?;
+            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+        }
+        Ok(())
+    }
+
+    /// Lights that a part of the pixels draw.
+    fn resample(&mut self, frame: &mut Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
+        let Some(reservoirs) = self.indirect.as_ref().and_then(Indirect::reservoirs) else {
+            return Ok((Vec::new(), Stage::Merge(0)));
+        };
+        let (all, number) = (self.pixels(), self.done);
+        let end = first.saturating_add(reservoirs.pixels[0]).min(all);
+        let timings = self.submit(|own, recorder| {
+            let Some((indirect, reservoirs)) = own.indirect.as_ref().and_then(|own| Some((own, own.reservoirs()?)))
+            else {
+                return Ok(());
+            };
+            let Some(seen) = &own.seen else { return Ok(()) };
+            recorder.pass("many-light: resample", |pass| {
+                if !frame.is_shown {
+                    seen.show(pass);
+                }
+                let sight = Sight {
+                    scene: &own.scene,
+                    seen,
+                    from: frame.from,
+                };
+                let lights = (indirect.source.records(), frame.lights);
+                reservoirs.record_resample(pass, &sight, lights, number, first..end)
+            })
+        })?;
+        frame.is_shown = true;
+        let next = if end < all {
+            Stage::Resample(end)
+        } else {
+            Stage::Reuse(0)
+        };
+        Ok((timings, next))
+    }
+
+    /// Light of what a part of the pixels and their neighbours keep.
+    fn reuse(&mut self, frame: &Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
+        let Some(reservoirs) = self.indirect.as_ref().and_then(Indirect::reservoirs) else {
+            return Ok((Vec::new(), Stage::Merge(0)));
+        };
+        let (all, number) = (self.pixels(), self.done);
+        let end = first.saturating_add(reservoirs.pixels[1]).min(all);
+        let timings = self.submit(|own, recorder| {
+            let Some((indirect, reservoirs)) = own.indirect.as_ref().and_then(|own| Some((own, own.reservoirs()?)))
+            else {
+                return Ok(());
+            };
+            let Some(seen) = &own.seen else { return Ok(()) };
+            recorder.pass("many-light: reuse", |pass| {
+                if first == 0 {
+                    own.record_black(pass)?;
+                }
+                let sight = Sight {
+                    scene: &own.scene,
+                    seen,
+                    from: frame.from,
+                };
+                let records = indirect.source.records();
+                reservoirs.record_reuse(pass, &sight, records, number, first..end, &own.radiance)
+            })
+        })?;
+        if end < all {
+            return Ok((timings, Stage::Reuse(end)));
+        }
+        if let Some(reservoirs) = self.indirect.as_ref().and_then(Indirect::reservoirs) {
+            let [connections, tests] = reservoirs.counts()?;
+            self.counts.connections += connections;
+            self.counts.visibility_tests += tests;
+        }
+        Ok((timings, Stage::Merge(0)))
+    }
+
     /// What gathers the lights from one on: as many as have a map at the same time, or all.
     fn first_lights(&self, frame: &Frame, first: u32) -> Stage {
         if frame.views > 0 {
@@ -391,6 +547,9 @@ impl ManyLight {
         let Some(indirect) = self.indirect.as_ref().filter(|_| first < frame.lights) else {
             return Stage::Merge(0);
         };
+        if indirect.reservoirs().is_some() {
+            return Stage::Resample(0);
+        }
         match indirect.maps {
             Some(_) => Stage::Maps {
                 first,
@@ -454,10 +613,9 @@ impl ManyLight {
     }
 
     fn gather(&mut self, frame: &Frame, lights: Range<u32>, place: u32, sweeps: u64) -> Result<(Vec<Timings>, Stage)> {
-        let Some(indirect) = &self.indirect else {
+        let Some(split) = self.indirect.as_ref().and_then(Indirect::split) else {
             return Ok((Vec::new(), Stage::Merge(0)));
         };
-        let split = &indirect.split;
         let all = split.interleaving.places() as u32;
         let end = place.saturating_add(split.places_at_once).min(all);
         // Those that a subset has, at most, as many a submission as are a bounded piece of work.
@@ -466,13 +624,13 @@ impl ManyLight {
         let wanted = u64::from(of_subset.div_ceil(split.lights_at_once)).saturating_sub(sweeps);
         let count = (split.connections / work.max(1)).clamp(1, wanted.max(1)) as u32;
         let timings = self.submit(|own, recorder| {
-            let Some(indirect) = &own.indirect else {
+            let Some((indirect, split)) = own.indirect.as_ref().and_then(|own| Some((own, own.split()?))) else {
                 return Ok(());
             };
             let maps = indirect.maps.as_ref();
             let records = indirect.source.records();
             recorder.pass("many-light: gather", |pass| {
-                indirect.split.record_sweeps(
+                split.record_sweeps(
                     pass,
                     &own.scene,
                     frame.from,
@@ -482,10 +640,10 @@ impl ManyLight {
                 )
             })
         })?;
-        let Some(indirect) = &self.indirect else {
+        let Some(split) = self.indirect.as_ref().and_then(Indirect::split) else {
             return Ok((timings, Stage::Merge(0)));
         };
-        let swept = indirect.split.swept()?;
+        let swept = split.swept()?;
         self.counts.connections += swept.connections;
         self.counts.visibility_tests += swept.tests;
         let sweeps = sweeps + u64::from(count);
@@ -513,17 +671,17 @@ impl ManyLight {
 
     fn merge(&mut self, frame: &Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
         let all = self.pixels();
-        let merges = frame.lights > 0;
-        let at_once = self.indirect.as_ref().filter(|_| merges);
-        let at_once = at_once.map_or(all, |indirect| indirect.split.pixels);
+        let gathered = frame.lights > 0;
+        let at_once = self.indirect.as_ref().filter(|_| gathered).and_then(Indirect::split);
+        let at_once = at_once.map_or(all, |split| split.pixels);
         let end = first.saturating_add(at_once).min(all);
         let timings = self.submit(|own, recorder| {
-            if let (Some(indirect), Some(seen), true) = (&own.indirect, &own.seen, merges) {
+            let split = own.indirect.as_ref().filter(|_| gathered).and_then(Indirect::split);
+            if let (Some(split), Some(seen)) = (split, &own.seen) {
                 recorder.pass("many-light: merge", |pass| {
-                    let split = &indirect.split;
                     split.record_merge(pass, seen, frame.lights, first..end, &own.radiance)
                 })?;
-            } else if own.direct.is_none() && frame.views == 0 {
+            } else if own.direct.is_none() && frame.views == 0 && !gathered {
                 recorder.pass("many-light: black", |pass| {
                     pass.fill(own.radiance.view(), 0)?;
                     pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);

@@ -42,10 +42,10 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// For pictures of `size` pixels, with what a filter reads if there is one.
-    pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, size: [u32; 2], filters: bool) -> Result<Self> {
+    /// For pictures of `size` pixels, with what tells neighbours on the same surface if those are asked for.
+    pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, size: [u32; 2], has_neighbours: bool) -> Result<Self> {
         let mut outputs = vec![Output::Triangle, Output::Weights];
-        if filters {
+        if has_neighbours {
             outputs.extend([Output::Position, Output::Normals]);
         }
         let desc = GBufferDesc {
@@ -71,7 +71,7 @@ impl Seen {
     }
 
     /// One of its pictures, or another that stands for it where it was not asked for, which the kernel then does not read.
-    fn view(&self, output: Output, other: Output) -> Result<SampledView<'_>> {
+    pub fn view(&self, output: Output, other: Output) -> Result<SampledView<'_>> {
         let image = |output| self.gbuffer.image(output);
         let image: &Image = image(output).or_else(|| image(other)).ok_or_else(|| Error::Picture {
             path: output.name().into(),
@@ -207,7 +207,6 @@ pub(super) struct Split {
     split: ComputePipeline<deferred_split::Kernel>,
     gather: ComputePipeline<deferred_gather::Kernel>,
     merge: ComputePipeline<deferred_merge::Kernel>,
-    filters: bool,
     plane_max: f32,
     normal_min: f32,
     bound: EdgeBound,
@@ -289,7 +288,6 @@ impl Split {
                 gpu.compute_pipeline(&spec)?
             },
             merge: gpu.compute_pipeline(&deferred_merge::Spec { filters, adds })?,
-            filters,
             plane_max: settings.filter_plane * (upper - lower).length(),
             normal_min: settings.filter_normal,
             bound,
@@ -436,10 +434,5 @@ impl Split {
             radiance: radiance.view(),
         };
         pass.dispatch(&self.merge, &[&set], &push, groups)
-    }
-
-    /// Whether neighbours are averaged.
-    pub fn filters(&self) -> bool {
-        self.filters
     }
 }

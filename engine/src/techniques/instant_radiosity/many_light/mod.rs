@@ -23,8 +23,10 @@
 //!   ([`splat_atlas`](crate::raster::splat_atlas)), and has cut-outs opaque. `rays` adds no error.
 //! - *Placement.* By walks exact. By reflective shadow maps what a texel's middle meets stands for all of the texel, so that light ends a texel from where it should.
 //!   Lights that are kept stand for all directions of their lamps in every frame: a picture of many frames has the error of one, of the order of one over the lights.
+//!   Lights that chains have chosen are weighted by one over a measured power, and chains are finite: an error of the order of one over the pixels that measure it, and of one over the lights.
 //! - *Discs.* What is gathered from texels in discs comes through everything, and what lies beyond a disc or the view that it is in is missing; the published weight is off
 //!   by what the light falls or grows over a disc.
+//! - *Reservoirs.* None of their own: what neighbours keep is weighted by the chance that each pixel had to keep it.
 //! - *Edges.* Rasterizers round corners to parts of a pixel (1/256 here): what is seen at a silhouette may be what lies behind, as far beside it, even where that is inside
 //!   of a closed body.
 //!
@@ -45,9 +47,11 @@ mod interleave;
 mod kept;
 mod kernels;
 mod maps;
+mod metropolis;
 mod records;
 mod reflective;
 mod renderer;
+mod reservoirs;
 mod settings;
 
 pub(in crate::techniques) use card::CARD;

@@ -10,8 +10,10 @@ use super::frame::Frame;
 use super::kept::KeptLights;
 use super::kernels::{Direct, Seen, Split};
 use super::maps::Maps;
+use super::metropolis::Metropolis;
 use super::records::LightRecord;
 use super::reflective::Reflective;
+use super::reservoirs::Reservoirs;
 use super::settings::{Gathering, ManyLightSettings, Placement};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
@@ -47,6 +49,8 @@ pub struct ManyLightCounts {
     pub renewed: u64,
     /// Rays that told whether a lamp that has moved still sees a kept light.
     pub sight_rays: u64,
+    /// Rays of chains that have chosen lights, and of what has measured their power.
+    pub chain_rays: u64,
     /// Pairs of a pixel and a virtual light.
     pub connections: u64,
     /// Pairs whose visibility was asked for: the others bring nothing, whatever stands between.
@@ -88,6 +92,7 @@ pub(super) enum LightSource {
     Walks(Box<PhotonTracer>),
     Reflective(Box<Reflective>),
     Kept(Box<KeptLights>),
+    Metropolis(Box<Metropolis>),
 }
 
 impl LightSource {
@@ -97,6 +102,16 @@ impl LightSource {
             Self::Walks(tracer) => tracer.records(),
             Self::Reflective(reflective) => reflective.records(),
             Self::Kept(kept) => kept.records(),
+            Self::Metropolis(chains) => chains.records(),
+        }
+    }
+
+    /// What walks from the lights, if something does.
+    pub fn tracer(&mut self) -> Option<&mut PhotonTracer> {
+        match self {
+            Self::Walks(tracer) => Some(tracer),
+            Self::Metropolis(chains) => Some(&mut chains.tracer),
+            Self::Reflective(_) | Self::Kept(_) => None,
         }
     }
 
@@ -105,6 +120,7 @@ impl LightSource {
             Self::Walks(tracer) => tracer.set_seed(seed),
             Self::Reflective(reflective) => reflective.set_seed(seed),
             Self::Kept(kept) => kept.set_seed(seed),
+            Self::Metropolis(chains) => chains.set_seed(seed),
         }
     }
 
@@ -113,6 +129,7 @@ impl LightSource {
             Self::Walks(tracer) => tracer.pipelines(),
             Self::Reflective(reflective) => reflective.pipelines(),
             Self::Kept(kept) => kept.pipelines(),
+            Self::Metropolis(chains) => chains.pipelines(),
         }
     }
 
@@ -122,6 +139,7 @@ impl LightSource {
             Self::Walks(_) => 0,
             Self::Reflective(reflective) => reflective.bytes(),
             Self::Kept(kept) => kept.bytes(),
+            Self::Metropolis(chains) => chains.bytes(),
         }
     }
 }
@@ -129,8 +147,14 @@ impl LightSource {
 /// Light of virtual lights.
 pub(super) struct Indirect {
     pub(super) source: LightSource,
-    pub(super) split: Split,
+    pub(super) gatherer: Gatherer,
     pub(super) maps: Option<Maps>,
+}
+
+/// How pixels take their light.
+pub(super) enum Gatherer {
+    Split(Box<Split>),
+    Reservoirs(Box<Reservoirs>),
 }
 
 impl ManyLight {
@@ -166,14 +190,15 @@ impl ManyLight {
         let surfaces = scene.surfaces();
         let pixels = size[0] * size[1];
         let direct = shows_direct.then(|| Direct::new(gpu, &scene, &settings, pixels));
-        let has_discs = settings.gathering != Gathering::Lights;
+        let has_discs = settings.has_discs();
         let indirect =
             (shows_indirect && !has_discs).then(|| Indirect::new(gpu, &scene, &settings, size, shows_direct));
         let discs = (shows_indirect && has_discs).then(|| Discs::new(gpu, &scene, &settings, pixels));
         let (direct, indirect, discs) = (direct.transpose()?, indirect.transpose()?, discs.transpose()?);
-        let filters = indirect.as_ref().is_some_and(|indirect| indirect.split.filters());
+        let has_neighbours = indirect.is_some() && settings.has_neighbours();
         let is_seen = shows_direct || shows_indirect;
-        let seen = is_seen.then(|| Seen::new(gpu, &surfaces, size, filters)).transpose()?;
+        let seen = is_seen.then(|| Seen::new(gpu, &surfaces, size, has_neighbours));
+        let seen = seen.transpose()?;
         let bytes = FrameTarget::bytes(size);
         Ok(Self {
             gpu: gpu.clone(),
@@ -219,6 +244,13 @@ impl ManyLight {
         self.indirect.is_some()
     }
 
+    /// Whether pixels keep one of them each.
+    pub fn has_reservoirs(&self) -> bool {
+        self.indirect
+            .as_ref()
+            .is_some_and(|indirect| indirect.reservoirs().is_some())
+    }
+
     /// Whether pixels gather from reflective shadow maps instead.
     pub fn has_discs(&self) -> bool {
         self.discs.is_some()
@@ -229,14 +261,17 @@ impl ManyLight {
         self.direct.is_some()
     }
 
-    /// Bytes of what lies between passes: G-buffer, split picture, shadow maps, views of lights; not the records of virtual lights, 64 bytes each.
+    /// Bytes of what lies between passes: G-buffer, split picture or reservoirs, shadow maps, views of lights; not the records of virtual lights, 64 bytes each.
     pub fn bytes(&self) -> u64 {
         let seen = self.seen.as_ref().map_or(0, |seen| seen.gbuffer.bytes());
-        let split = self.indirect.as_ref().map_or(0, |indirect| indirect.split.bytes());
+        let gathered = self.indirect.as_ref().map_or(0, |indirect| match &indirect.gatherer {
+            Gatherer::Split(split) => split.bytes(),
+            Gatherer::Reservoirs(reservoirs) => reservoirs.bytes(),
+        });
         let maps = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
         let source = self.indirect.as_ref().map_or(0, |indirect| indirect.source.bytes());
         let source = source + self.discs.as_ref().map_or(0, |discs| discs.reflective.bytes());
-        seen + split + source + maps.map_or(0, Maps::bytes)
+        seen + gathered + source + maps.map_or(0, Maps::bytes)
     }
 
     /// The virtual lights that a frame has placed last, those of all together that have power; none before the first ones.
@@ -262,7 +297,10 @@ impl ManyLight {
         all.extend(self.direct.iter().map(Direct::info));
         if let Some(indirect) = &self.indirect {
             all.extend(indirect.source.pipelines());
-            all.extend(indirect.split.pipelines());
+            match &indirect.gatherer {
+                Gatherer::Split(split) => all.extend(split.pipelines()),
+                Gatherer::Reservoirs(reservoirs) => all.extend(reservoirs.pipelines()),
+            }
             all.extend(indirect.maps.iter().flat_map(Maps::pipelines));
         }
         all.extend(self.discs.iter().flat_map(Discs::pipelines));
@@ -295,6 +333,9 @@ impl ManyLight {
         }
         if let Some(indirect) = &mut self.indirect {
             indirect.source.set_seed(seed);
+            if let Gatherer::Reservoirs(reservoirs) = &mut indirect.gatherer {
+                reservoirs.set_seed(seed);
+            }
         }
         if let Some(discs) = &mut self.discs {
             discs.set_seed(seed);
@@ -354,9 +395,27 @@ impl ManyLight {
 }
 
 impl Indirect {
+    /// The split picture, where lights are shared out among tiles.
+    pub(super) fn split(&self) -> Option<&Split> {
+        match &self.gatherer {
+            Gatherer::Split(split) => Some(split),
+            Gatherer::Reservoirs(_) => None,
+        }
+    }
+
+    pub(super) fn reservoirs(&self) -> Option<&Reservoirs> {
+        match &self.gatherer {
+            Gatherer::Reservoirs(reservoirs) => Some(reservoirs),
+            Gatherer::Split(_) => None,
+        }
+    }
+
     fn new(gpu: &Gpu, scene: &Arc<GpuScene>, settings: &ManyLightSettings, size: [u32; 2], adds: bool) -> Result<Self> {
         let plan = PhotonPlan {
-            photons: settings.lights,
+            photons: match settings.placement {
+                Placement::Metropolis => settings.pool,
+                _ => settings.lights,
+            },
             sampler: settings.sampler,
             seed: settings.seed,
             submission_work: settings.submission_work,
@@ -370,20 +429,26 @@ impl Indirect {
                 last_bounce: 0,
             },
         };
+        let tracer = || PhotonTracer::new(gpu, Arc::clone(scene), plan, Box::new(LightAppend::new(gpu, scene)?));
         let source = match settings.placement {
-            Placement::Walks => {
-                let append = Box::new(LightAppend::new(gpu, scene)?);
-                let tracer = PhotonTracer::new(gpu, Arc::clone(scene), plan, append)?;
-                LightSource::Walks(Box::new(tracer))
+            Placement::Walks => LightSource::Walks(Box::new(tracer()?)),
+            Placement::Metropolis => {
+                LightSource::Metropolis(Box::new(Metropolis::new(gpu, scene, settings, tracer()?)?))
             }
             Placement::Rsm => LightSource::Reflective(Box::new(Reflective::new(gpu, scene, settings)?)),
             Placement::Incremental => LightSource::Kept(Box::new(KeptLights::new(gpu, scene, settings)?)),
         };
         let maps = Maps::new(gpu, &scene.surfaces(), settings)?;
-        Ok(Self {
-            source,
-            split: Split::new(gpu, scene, settings, size, adds, maps.is_some())?,
-            maps,
-        })
+        let gatherer = match settings.gathering {
+            Gathering::Reservoirs => {
+                let pixels = size[0] * size[1];
+                Gatherer::Reservoirs(Box::new(Reservoirs::new(gpu, scene, settings, pixels)?))
+            }
+            Gathering::Lights | Gathering::Disc | Gathering::DiscSquared => {
+                let split = Split::new(gpu, scene, settings, size, adds, maps.is_some())?;
+                Gatherer::Split(Box::new(split))
+            }
+        };
+        Ok(Self { source, gatherer, maps })
     }
 }

@@ -46,6 +46,8 @@ pub enum Placement {
     Rsm,
     /// They are kept from frame to frame where their lamps still see them, and a few are placed anew.
     Incremental,
+    /// Those of many walks that Metropolis chains choose by what they bring to the picture.
+    Metropolis,
 }
 
 /// Points that choose texels of reflective shadow maps.
@@ -72,8 +74,14 @@ pub enum Gathering {
     Disc,
     /// So, weighted by the square of their distance from the disc's middle, as published.
     DiscSquared,
+    /// From one that is kept of several drawn for each pixel, or of those that neighbours keep.
+    Reservoirs,
 }
 
+/// Lights that chains choose at most.
+const CHOSEN_MAX: u32 = 4096;
+/// Lights that a pixel draws at most: loops of software drivers end after some iterations.
+const RESERVOIR_CANDIDATES_MAX: u32 = 1024;
 /// Tiles along a side at most: windows of filters are as wide, in pixels.
 const INTERLEAVE_MAX: u32 = 16;
 
@@ -81,16 +89,27 @@ crate::settings! {
     /// Settings of frames of many lights.
     pub struct ManyLightSettings {
         /// Virtual lights of each frame: as many walks from the lights, each of which leaves one where it first lands on a surface that is no mirror, points on reflective
-        /// shadow maps, or directions of the lamps.
+        /// shadow maps, directions of the lamps, or those that chains choose.
         pub lights: u32 = 512, in 1..=1 << 16, unit "lights per frame";
         /// Where they come from: walks; reflective shadow maps of the lights, drawn anew each frame, whose texels are chosen by what they reflect; or, of points and spots alone,
-        /// incremental: they are kept from frame to frame, weighted by the directions of the lamp that are nearest to them.
+        /// incremental: they are kept from frame to frame, weighted by the directions of the lamp that are nearest to them; or metropolis: chains choose those of many walks that
+        /// bring light to the picture, each of which then brings as much.
         ///
         /// Sources: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005; S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect
-        /// Illumination", EGSR 2007.
+        /// Illumination", EGSR 2007; B. Segovia, J.-C. Iehl and B. Péroche, "Metropolis Instant Radiosity", Eurographics 2007.
         pub placement: Placement = Placement::Walks;
         /// Kept lights that are placed anew in a frame at most, but for the first one: in place of those that a lamp which has moved no longer sees, or that crowd others.
         pub renewed: u32 = 8, in 1..=DIRECTIONS_MAX, unit "lights per frame";
+        /// Of metropolis: walks of a frame, whose virtual lights chains choose from.
+        pub pool: u32 = 8192, in 1..=1 << 16, unit "walks per frame";
+        /// Of metropolis: proposals for a step of a chain, of which it chooses one by what they bring.
+        ///
+        /// Source: J. Liu, F. Liang and W. Wong, "The Multiple-Try Method and Local Optimization in Metropolis Sampling", JASA 95, 2000.
+        pub tries: u32 = 4, in 1..=16, unit "tries";
+        /// Of metropolis: steps of a chain from a light that it chooses to the next; more make lights less alike.
+        pub mutations: u32 = 4, in 1..=64, unit "steps";
+        /// Of metropolis: pixels at which the power is measured that a chosen light sends to the picture, by a ray each.
+        pub power_pixels: u32 = 256, in 16..=4096, unit "pixels";
         /// Along a side of each view of a light, of which a point light has six; a power of two.
         pub rsm_side: u32 = 64, in 8..=1024, unit "texels";
         /// Points that choose texels of reflective shadow maps; changes the noise only.
@@ -98,12 +117,22 @@ crate::settings! {
         /// Primary virtual lights of a frame that have reflective shadow maps, where a light has an area or surrounds the scene, or there are more lights; else each light has its own.
         pub emitters: u32 = 4, in 1..=64, unit "lights";
         /// How pixels gather: from virtual lights, or from texels in a disc of each view of a light, about where that shows the pixel's point, which brings light through everything and
-        /// leaves out what is beyond the disc.
+        /// leaves out what is beyond the disc; or from reservoirs, with one ray: of some lights drawn for each pixel one is kept by what it would bring, and of those that a pixel and its
+        /// neighbours keep one is taken, without tiles or filter.
+        ///
+        /// Sources: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005; B. Bitterli et al., "Spatiotemporal reservoir resampling for real-time ray
+        /// tracing with dynamic direct lighting", SIGGRAPH 2020.
         pub gathering: Gathering = Gathering::Lights;
         /// Samples of a disc.
         pub disc_samples: u32 = 400, in 1..=4096, unit "texels";
         /// Radius of discs over the width of a view.
         pub disc_radius: f32 = 0.3, in 0.0..=2.0;
+        /// Of reservoirs: lights that are drawn for each pixel, from as many even parts of all.
+        pub candidates: u32 = 16, in 1..=RESERVOIR_CANDIDATES_MAX, unit "lights";
+        /// Of reservoirs: neighbouring pixels that are asked for what they keep, of which those on the same surface count, as `filter_plane` and `filter_normal` say.
+        pub neighbours: u32 = 3, in 0..=8, unit "pixels";
+        /// Of reservoirs: how far neighbours are away along each axis, at most.
+        pub neighbour_reach: f32 = 8.0, in 1.0..=64.0, unit "pixels";
         /// What tells whether a point sees a virtual light: a shadow ray, a shadow map of each light, an imperfect one of points of the surfaces, or nothing.
         ///
         /// Of nothing pictures are too bright; maps err at borders of shadows, imperfect ones also by what their points miss.
@@ -160,12 +189,20 @@ impl ManyLightSettings {
             let cause = "is no range of bounces of bounces=0..2,lobes=diffuse+glossy";
             return Err(Error::setting("path_set", set, cause));
         }
-        if self.gathering != Gathering::Lights && self.placement != Placement::Rsm {
+        if self.has_discs() && self.placement != Placement::Rsm {
             let cause = "needs reflective shadow maps: placement = \"rsm\"";
             return Err(Error::setting("gathering", format!("{:?}", self.gathering), cause));
         }
+        if self.gathering == Gathering::Reservoirs && !matches!(self.visibility, Visibility::None | Visibility::Rays) {
+            let cause = "has no part in reservoirs, which ask with one ray a pixel: visibility = \"rays\"";
+            return Err(Error::setting("visibility", format!("{:?}", self.visibility), cause));
+        }
         if self.placement == Placement::Incremental && self.lights > DIRECTIONS_MAX {
             let cause = format!("are more than the {DIRECTIONS_MAX} that placement = \"incremental\" keeps");
+            return Err(Error::setting("lights", self.lights, cause));
+        }
+        if self.placement == Placement::Metropolis && self.lights > CHOSEN_MAX {
+            let cause = format!("are more than the {CHOSEN_MAX} that placement = \"metropolis\" measures");
             return Err(Error::setting("lights", self.lights, cause));
         }
         if !self.rsm_side.is_power_of_two() {
@@ -179,6 +216,11 @@ impl ManyLightSettings {
         self.path_set.min_bounces() <= bounces && self.path_set.max_bounces().is_none_or(|most| bounces <= most)
     }
 
+    /// Whether pixels gather from reflective shadow maps.
+    pub(super) fn has_discs(&self) -> bool {
+        matches!(self.gathering, Gathering::Disc | Gathering::DiscSquared)
+    }
+
     /// Parts that the lights fall in.
     pub(super) fn subsets(&self) -> u32 {
         if self.whole_sets {
@@ -190,7 +232,12 @@ impl ManyLightSettings {
 
     /// Whether there is anything to average.
     pub(super) fn filters(&self) -> bool {
-        self.filter && self.interleave > 1
+        self.gathering == Gathering::Lights && self.filter && self.interleave > 1
+    }
+
+    /// Whether pixels ask which others see the same surface.
+    pub(super) fn has_neighbours(&self) -> bool {
+        self.filters() || self.gathering == Gathering::Reservoirs && self.neighbours > 0
     }
 
     /// The bound, for surfaces of that area, m².
