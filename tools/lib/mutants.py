@@ -277,6 +277,7 @@ def compile_modules(root, mutants):
 
 
 def cargo(*arguments, **options):
+    """On the whole workspace: of one package other crates may have other features, and all of them would be built again."""
     return subprocess.run(["cargo", *arguments], cwd=TREE, stdin=subprocess.DEVNULL, text=True, **options)
 
 
@@ -340,7 +341,7 @@ def prepare(commit, few):
         inside = [mutant for mutant in wanted if mutant.number not in left_out]
         places = write_tree(inside, texts.__getitem__)
         say(f"checking {len(inside)} faults")
-        run = cargo("check", "-q", "--package=clerestory", "--lib", "--color=never", capture_output=True)
+        run = cargo("check", "-q", "--workspace", "--lib", "--color=never", capture_output=True)
         if run.returncode == 0:
             break
         (WORK / f"check-{attempt}.log").write_text(run.stderr)
@@ -364,9 +365,10 @@ def prepare(commit, few):
 
 def read_rows():
     """Of each row its tests: the options that build them, the program's name, and the function's."""
-    run = cargo("run", "-q", "--package=clerestory-tests", "--bin=mutants", capture_output=True)
-    if run.returncode != 0:
-        die(run.stderr)
+    build = cargo("build", "-q", "--workspace", "--bin=mutants", capture_output=True)
+    if build.returncode != 0:
+        die(build.stderr)
+    run = subprocess.run([WORK / "target" / "debug" / "mutants"], capture_output=True, check=True, text=True)
     rows = {}
     for line in run.stdout.splitlines():
         row, kind, options, program, function = line.split("\t")
@@ -389,7 +391,8 @@ class Programs:
 
     def __init__(self, options):
         say("building the tests")
-        build = cargo("test", "--no-run", "--message-format=json", "--color=never", *options, capture_output=True)
+        options = [option for option in options if not option.startswith("--package=")]
+        build = cargo("test", "--no-run", "--workspace", "--message-format=json", "--color=never", *options, capture_output=True)
         (WORK / "build.log").write_text(build.stderr)
         if build.returncode != 0:
             die(f"the tests do not build: see {WORK}/build.log")

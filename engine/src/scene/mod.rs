@@ -530,7 +530,7 @@ impl Environment {
 }
 
 /// A camera in world space.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// Name from the file, or made up.
     pub name: String,

@@ -1,10 +1,10 @@
 //! A window on a scene whose lamp moves, lit anew in every frame by many virtual lights.
 //!
-//! `many_lights [SCENE] [--lights N] [--placement walks|rsm|incremental] [--visibility none|rays|maps] [--bound none|geometry|distance] [--interleave TILES]
+//! `many_lights [SCENE] [--lights N] [--placement walks|rsm|incremental|metropolis] [--visibility none|rays|maps] [--bound none|geometry|distance] [--interleave TILES]
 //! [--turn DEGREES] [--camera NAME] [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--keys KEYS] [--screenshot FILE]`
 //!
 //! Each frame the lamp goes around the middle of the scene by `--turn`, its virtual lights are left anew where its light lands, and every pixel gathers the light
-//! of its part of them; with `--placement incremental` those that the lamp still sees stay where they are. Space holds the lamp, and the picture converges. V goes on
+//! of its part of them; with `--placement incremental` those that the lamp still sees stay where they are, with `metropolis` chains choose them among more. Space holds the lamp, and the picture converges. V goes on
 //! to the next way to tell who sees a virtual light, B to the next bound of its brightness up close, + and - double and halve the lights, F shows the tiles without
 //! their filter, P goes on to the next part of the light: all, what lamps send directly, or what virtual lights bring. Otherwise as the viewer.
 //!
@@ -30,8 +30,9 @@ use winit::keyboard::{Key, NamedKey};
 const SCENE: &str = "builtin:cornell-box?source=point";
 /// Walks per frame, unless told otherwise.
 const LIGHTS: u32 = 256;
-/// Walks per frame that keys go to at most and at least.
+/// Walks per frame that keys go to at most and at least; kept lights, and those that chains choose, are fewer.
 const LIGHTS_MAX: u32 = 1 << 14;
+const PLACED_MAX: u32 = 1 << 12;
 const LIGHTS_MIN: u32 = 16;
 /// Degrees that the lamp goes around each frame, unless told otherwise.
 const TURN: f64 = 3.0;
@@ -200,7 +201,7 @@ impl Show for ManyLights {
         let (seconds, frames) = std::mem::take(&mut self.untold);
         let s = &self.settings;
         format!(
-            "{}: {} walks, visibility {:?}, bound {:?}, filter {}, {:.1} frames/s",
+            "{}: {} lights, visibility {:?}, bound {:?}, filter {}, {:.1} frames/s",
             PARTS[self.part].0,
             s.lights,
             s.visibility,
@@ -220,7 +221,13 @@ impl Show for ManyLights {
             Key::Character(text) => match text.to_lowercase().as_str() {
                 "v" => s.visibility = next(&VISIBILITIES, s.visibility),
                 "b" => s.bound = next(&BOUNDS, s.bound),
-                "+" | "=" => s.lights = (2 * s.lights).min(LIGHTS_MAX),
+                "+" | "=" => {
+                    let most = match s.placement {
+                        Placement::Walks | Placement::Rsm => LIGHTS_MAX,
+                        Placement::Incremental | Placement::Metropolis => PLACED_MAX,
+                    };
+                    s.lights = (2 * s.lights).min(most);
+                }
                 "-" => s.lights = (s.lights / 2).max(LIGHTS_MIN),
                 "f" => s.filter = !s.filter,
                 "p" => self.next_part(),

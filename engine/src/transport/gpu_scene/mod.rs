@@ -314,13 +314,13 @@ impl GpuScene {
         })
     }
 
-    /// As [`index_within`](Self::index_within), for kernels that ask about candidates where surfaces let light through in places: lanes that ask wait for each other.
+    /// As [`index_within`](Self::index_within), for kernels that ask about candidates where surfaces let light through in places: lanes that ask wait for each other, whose iterations software devices add up.
     ///
     /// # Errors
     /// As there, and for quotas that are too small once lanes wait.
     pub fn filtered_index_within(&self, gpu: &Gpu, steps: u32) -> Result<IndexWithin> {
         let within = self.index_within(gpu, steps)?;
-        if !self.profile.has_alpha() {
+        if !self.profile.has_alpha() || gpu.caps().kind != DeviceKind::Cpu {
             return Ok(within);
         }
         let quota = (steps / gpu.caps().subgroup_size.max(1)).min(within.quota);

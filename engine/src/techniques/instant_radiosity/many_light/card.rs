@@ -88,9 +88,12 @@ fn fits(caps: &Caps, size: [u32; 2]) -> Result<()> {
     Ok(())
 }
 
-/// Frames are independent, and pixels of a tile have the lights of one.
-fn law(_: &Settings) -> Result<Law> {
+/// Frames are independent, and pixels of a tile have the lights of one; lights that are kept bring the same error in all of them.
+fn law(settings: &Settings) -> Result<Law> {
+    let settings: ManyLightSettings = settings.read()?;
+    let stays = settings.placement == Placement::Incremental;
     Ok(Law {
+        slope: if stays { 0.0 } else { Law::INDEPENDENT.slope },
         shares_noise: true,
         ..Law::INDEPENDENT
     })
@@ -173,6 +176,14 @@ impl Technique for ManyLight {
                 lights && settings.placement == Placement::Walks,
                 "reflective shadow maps",
                 "virtual lights come from walks",
+            ),
+            (
+                lights
+                    && settings.placement == Placement::Incremental
+                    && !matches!(settings.visibility, Visibility::None | Visibility::Rays)
+                    && !self.keeps_maps(),
+                "shadow maps that stay from frame to frame",
+                "there are more lights than maps fit in memory at the same time",
             ),
             (
                 lights && settings.placement == Placement::Incremental,
@@ -379,7 +390,7 @@ const ROWS: &[Row] = &[
         id: "SVO-G2",
         name: "incremental instant radiosity: virtual lights of points and spots that are kept from frame to frame, with shares of the power by Voronoi cells of their directions",
         role: Role::PartOf("SVO-P12"),
-        limits: "One bounce in scenes where nothing but lamps moves; what a set of directions misses it misses in every frame, and after a jump of a lamp new lights take frames to come; up to 256 exact shadow maps are kept.",
+        limits: "One bounce in scenes where nothing but lamps moves; what a set of directions misses it misses in every frame, and after a jump of a lamp new lights take frames to come; exact shadow maps are kept of up to 256 lights and 128 MiB, and else drawn anew in every frame.",
         sources: &[sources::LAINE_2007.whole(), sources::SUN_2015.at("§2.2.2")],
         shaders: &[
             "shaders/techniques/instant_radiosity/kept.glsl",

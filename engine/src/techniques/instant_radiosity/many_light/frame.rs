@@ -217,11 +217,13 @@ impl ManyLight {
     fn placed(&mut self, frame: &mut Frame, lights: u32) -> Result<Stage> {
         (frame.lights, self.placed) = (lights, lights);
         self.counts.lights += u64::from(lights);
+        let draws_maps = self.to_draw(frame, 0..lights).is_some();
         if let Some(Indirect {
             source,
             maps: Some(maps),
             ..
         }) = &mut self.indirect
+            && draws_maps
         {
             maps.begin(&self.gpu, source.records(), lights)?;
         }

@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 
+use super::kernels::ray_stopped;
 use super::settings::ManyLightSettings;
 use crate::accel::NO_HIT;
 use crate::gpu::ash::vk;
@@ -45,6 +46,8 @@ pub(super) struct KeptLights {
     /// The lamp that new lights go to first.
     turn: usize,
     renewed_max: u32,
+    /// Steps through the index after which a ray stops.
+    ray_quota: u32,
     seed: u32,
     is_settled: bool,
     /// Some of them have light.
@@ -159,6 +162,7 @@ impl KeptLights {
             lamps: Vec::new(),
             turn: 0,
             renewed_max: settings.renewed,
+            ray_quota: index.quota,
             seed: settings.seed ^ TURN_SEED,
             is_settled: false,
             has_light: false,
@@ -342,7 +346,7 @@ impl KeptLights {
                 }
                 match hits[light].sight {
                     KEPT_SEEN => {}
-                    KEPT_STOPPED => return Err(stopped()),
+                    KEPT_STOPPED => return Err(ray_stopped("kept_rays", self.ray_quota)),
                     _ => kept.directions.set(number, None),
                 }
             }
@@ -405,7 +409,7 @@ impl KeptLights {
                 let way = &mut kept.ways[*number];
                 let hit = &hits[way.light as usize];
                 if hit.sight == KEPT_STOPPED {
-                    return Err(stopped());
+                    return Err(ray_stopped("kept_rays", self.ray_quota));
                 }
                 let is_there = hit.triangle != NO_HIT;
                 way.end = is_there.then(|| Vec3::from_array(hit.position).as_dvec3());
@@ -476,17 +480,6 @@ fn submit(gpu: &Gpu, done: &mut Kept, record: impl FnOnce(&mut Recorder) -> Resu
     done.passes += (left - recorder.passes_left()) as u64;
     done.timings.push(recorder.submit()?.wait()?);
     Ok(())
-}
-
-/// A ray that its quota has stopped.
-fn stopped() -> Error {
-    Error::Overflow {
-        kernel: "kept_rays".into(),
-        what: "steps of a ray through the index".into(),
-        needed: u64::from(SOFTWARE_LOOP_CAP / 2) + 1,
-        capacity: u64::from(SOFTWARE_LOOP_CAP / 2),
-        instead: "choose another ray index".into(),
-    }
 }
 
 #[cfg(test)]

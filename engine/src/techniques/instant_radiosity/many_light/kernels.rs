@@ -106,6 +106,17 @@ pub(super) fn seen_from(camera: &CameraFrame, [width, height]: [u32; 2]) -> Seen
     }
 }
 
+/// Of a ray of a kernel that has stopped at its quota, for good.
+pub(super) fn ray_stopped(kernel: &str, quota: u32) -> Error {
+    Error::Overflow {
+        kernel: kernel.into(),
+        what: "steps of a ray through the index".into(),
+        needed: u64::from(quota) + 1,
+        capacity: quota.into(),
+        instead: "choose another ray index".into(),
+    }
+}
+
 /// What a frame's kernels look at.
 pub(super) struct Sight<'a> {
     pub scene: &'a GpuScene,

@@ -2,14 +2,15 @@
 
 use super::exact_maps::{ExactMaps, MapDrawing};
 use super::imperfect_maps::{ImperfectMaps, Splatting};
-use super::settings::{ManyLightSettings, Visibility};
+use super::settings::{ManyLightSettings, Placement, Visibility};
 use crate::Result;
 use crate::gpu::shaders::sets::OmniShadowSet;
 use crate::gpu::{Gpu, PipelineInfo, Recorder, TexelView};
 use crate::raster::{ShadowLayout, Surfaces};
 
-/// Bytes of maps at the same time.
+/// Bytes of maps at the same time, and of those that stay from frame to frame: what a buffer of the least devices holds.
 const BYTES_AT_ONCE: u64 = 32 << 20;
+const BYTES_KEPT: u64 = 128 << 20;
 
 /// How directions lie in the maps of virtual lights.
 pub(super) const LAYOUT: ShadowLayout = ShadowLayout::Octahedron;
@@ -32,7 +33,11 @@ pub(super) fn maps_at_once(settings: &ManyLightSettings, bytes: u64) -> u32 {
         0 => settings.lights,
         wanted => wanted.min(settings.lights),
     };
-    (BYTES_AT_ONCE / bytes.max(1)).clamp(1, u64::from(most)) as u32
+    let all = match settings.placement {
+        Placement::Incremental => BYTES_KEPT,
+        Placement::Walks | Placement::Rsm | Placement::Metropolis => BYTES_AT_ONCE,
+    };
+    (all / bytes.max(1)).clamp(1, u64::from(most)) as u32
 }
 
 impl Maps {

@@ -10,8 +10,9 @@
 //!
 //! The source's chains make their paths from the camera, light by light; here they choose among lights that walks have left, of which a new pool is drawn for every frame.
 
-use super::kernels::Sight;
+use super::kernels::{Sight, ray_stopped};
 use super::settings::{ManyLightSettings, Visibility};
+use crate::Result;
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{
     METROPOLIS_POWERS, METROPOLIS_PROPOSALS, METROPOLIS_REFERENCES, METROPOLIS_SEEDS, VIRTUAL_LIGHT_QUARTERS,
@@ -27,7 +28,6 @@ use crate::techniques::photon_mapping::PhotonTracer;
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::random::{Sampler, SamplerKind, pcg4d, sample_1d, sample_2d};
 use crate::transport::{GpuScene, surface_spec};
-use crate::{Error, Result};
 use glam::UVec4;
 
 /// Tells the numbers of chains from those of other samplers.
@@ -60,6 +60,8 @@ pub(super) struct Metropolis {
     steps_a_light: u32,
     power_pixels: u32,
     seed: u32,
+    /// Steps through the index after which a ray stops.
+    ray_quota: u32,
     /// Steps of chains, and tries that measure lights, of a submission.
     at_once: [u32; 2],
 }
@@ -170,6 +172,7 @@ impl Metropolis {
             steps_a_light: settings.mutations,
             power_pixels: settings.power_pixels,
             seed: settings.seed,
+            ray_quota: index.quota,
             at_once: [
                 steps.div_ceil(Part::count(gpu, u64::from(steps) * u64::from(of_step) * index.steps)),
                 measures
@@ -211,7 +214,7 @@ impl Metropolis {
     /// What comes next, recorded as one bounded submission: how many rays that are.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`].
+    /// [`DeviceLost`](crate::Error::DeviceLost).
     pub fn record(&self, recorder: &mut Recorder, sight: &Sight<'_>, chains: &Chains, is_shown: bool) -> Result<u64> {
         match chains.next {
             Next::Seeds => {
@@ -252,7 +255,7 @@ impl Metropolis {
     /// What was recorded last has been done.
     ///
     /// # Errors
-    /// [`Error::Overflow`] should the index have rays that never end.
+    /// [`Overflow`](crate::Error::Overflow) should the index have rays that never end.
     pub fn learn(&self, gpu: &Gpu, chains: &mut Chains) -> Result<()> {
         chains.next = match chains.next {
             Next::Seeds => {
@@ -304,13 +307,7 @@ impl Metropolis {
         let counters: Vec<metropolis_try::MetropolisCounters> = gpu.read(self.counters.view(), 1)?;
         match counters[0].stopped {
             0 => Ok(()),
-            _ => Err(Error::Overflow {
-                kernel: "metropolis_try".into(),
-                what: "steps of a ray through the index".into(),
-                needed: u64::from(SOFTWARE_LOOP_CAP / 2) + 1,
-                capacity: u64::from(SOFTWARE_LOOP_CAP / 2),
-                instead: "choose another ray index".into(),
-            }),
+            _ => Err(ray_stopped("metropolis_try", self.ray_quota)),
         }
     }
 

@@ -244,6 +244,13 @@ impl ManyLight {
         self.indirect.is_some()
     }
 
+    /// Whether each kept light has a shadow map of its own that stays from frame to frame.
+    pub fn keeps_maps(&self) -> bool {
+        let maps = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
+        let keeps = self.settings.placement == Placement::Incremental;
+        keeps && maps.is_some_and(|maps| maps.at_once() >= self.settings.lights)
+    }
+
     /// Whether pixels keep one of them each.
     pub fn has_reservoirs(&self) -> bool {
         self.indirect
@@ -308,16 +315,19 @@ impl ManyLight {
         all
     }
 
-    /// Looks through another camera and begins anew, also where a light has [moved](GpuScene::move_light). Virtual lights that are kept stay
-    /// ([`Placement::Incremental`]).
+    /// Looks through another camera, or the same, and begins anew, also where a light has [moved](GpuScene::move_light). Virtual lights that are kept stay
+    /// ([`Placement::Incremental`]), and their shadow maps: where an object has moved, [`restart`](Self::restart) instead.
     ///
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
         CameraFrame::new(camera, self.film.size())?;
         self.film.clear()?;
-        self.camera = camera.clone();
-        (self.done, self.frame, self.parts) = (0, None, None);
+        if self.camera != *camera {
+            self.camera = camera.clone();
+            self.parts = None;
+        }
+        (self.done, self.frame) = (0, None);
         Ok(())
     }
 

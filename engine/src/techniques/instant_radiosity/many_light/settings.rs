@@ -92,7 +92,7 @@ crate::settings! {
         /// shadow maps, directions of the lamps, or those that chains choose.
         pub lights: u32 = 512, in 1..=1 << 16, unit "lights per frame";
         /// Where they come from: walks; reflective shadow maps of the lights, drawn anew each frame, whose texels are chosen by what they reflect; or, of points and spots alone,
-        /// incremental: they are kept from frame to frame, weighted by the directions of the lamp that are nearest to them; or metropolis: chains choose those of many walks that
+        /// incremental: they are kept from frame to frame, with exact shadow maps of 128 MiB and 256 lights at most, weighted by the directions of the lamp that are nearest to them; or metropolis: chains choose those of many walks that
         /// bring light to the picture, each of which then brings as much.
         ///
         /// Sources: C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005; S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect

@@ -44,8 +44,8 @@ const FULL: Form = Form {
     lights: 256,
     map_side: 64,
     frames: 24,
-    oracle: 16_384,
-    every: 4,
+    oracle: 65_536,
+    every: 6,
 };
 const SMOKE: Form = Form {
     side: 12,
@@ -60,6 +60,8 @@ const RENEWED: u32 = 8;
 const ORACLE_SEED: u32 = 1000;
 /// Frames of a lamp that stands still.
 const STILL: u32 = 8;
+/// Pictures of new walks behind the jump.
+const JUMP_SEEDS: u32 = 8;
 const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
 const KEPT: &str = "kept lights";
 const NEW: &str = "new walks";
@@ -97,6 +99,17 @@ rows! {
     }
 }
 rows! {
+    /// What becomes of kept lights whose lamp jumps back to where it began.
+    struct Jump = "Frames behind a jump of the lamp, kept lights" by [scene] {
+        scene: String = "scene",
+        frames: u64 = "frames that renew all lights",
+        first: f64 = "relative RMSE of the first frame",
+        settled: f64 = "relative RMSE behind so many frames",
+        new: Repeats = "relative RMSE of new walks",
+        oracle: f64 = "oracle's own relative RMSE",
+    }
+}
+rows! {
     /// Kept lights beside new ones.
     struct Pair = "Kept lights beside new walks" by [scene] {
         scene: String = "scene",
@@ -112,6 +125,7 @@ rows! {
 pub struct Found {
     moving: Vec<Row>,
     still: Vec<Still>,
+    jumps: Vec<Jump>,
 }
 
 const OF_PAIRS: &[Criterion<Pair>] = &[
@@ -144,6 +158,19 @@ const OF_STILL: &[Criterion<Still>] = &[Criterion::each(
     |row: &Still| (row.lights + row.rays + row.maps).into(),
 )
 .in_every_form()];
+
+const OF_JUMPS: &[Criterion<Jump>] = &[
+    Criterion::each(
+        "once all lights are renewed behind a jump, they err no more than new ones: ratio of errors",
+        Bound::AtMost(1.0),
+        |row: &Jump| Repeats(row.new.0.iter().map(|new| row.settled / new).collect()).measured(),
+    ),
+    Criterion::each(
+        "the oracle errs by less than a tenth of what it judges: ratio of errors",
+        Bound::AtMost(0.1),
+        |row: &Jump| (row.oracle / row.settled.min(row.new.measured().value)).into(),
+    ),
+];
 
 fn pairs(rows: &[Row]) -> Vec<Pair> {
     let kept = rows.iter().filter(|row| row.way == KEPT);
@@ -260,7 +287,7 @@ struct Frames {
     last: Vec<f32>,
 }
 
-fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) -> Result<(Vec<Row>, Still)> {
+fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) -> Result<(Vec<Row>, Still, Jump)> {
     let form = context.pick(FULL, SMOKE);
     let subject = Subject::new(case)?;
     let scene = Arc::new(GpuScene::new(gpu, &subject.scene)?);
@@ -329,6 +356,25 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) ->
     }
     let after = still.counts();
     let name = short_name(case.0).to_owned();
+    scene.move_light(gpu, 0, &subject.lamp(0))?;
+    let truth = frame(&mut oracle, &subject, Some(ORACLE_SEED))?.0;
+    let again = frame(&mut oracle, &subject, Some(2 * ORACLE_SEED))?.0;
+    let first = difference(&frame(&mut renderers[0], &subject, None)?.0, &truth);
+    let renewals = form.lights.div_ceil(RENEWED);
+    for _ in 2..renewals {
+        frame(&mut renderers[0], &subject, None)?;
+    }
+    let settled = difference(&frame(&mut renderers[0], &subject, None)?.0, &truth);
+    let new = (0..JUMP_SEEDS).map(|seed| Ok(difference(&frame(&mut renderers[1], &subject, Some(seed))?.0, &truth)));
+    let jump = Jump {
+        scene: name.clone(),
+        frames: renewals.into(),
+        first,
+        settled,
+        new: Repeats(new.collect::<Result<_>>()?),
+        // Two oracles differ by the root of two of their errors.
+        oracle: difference(&again, &truth) * std::f64::consts::FRAC_1_SQRT_2,
+    };
     let rows = WAYS.iter().zip(found).map(|((way, _), frames)| Row {
         scene: name.clone(),
         way: (*way).into(),
@@ -344,23 +390,24 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) ->
         rays: after.sight_rays - before.sight_rays,
         maps: after.maps - before.maps,
     };
-    Ok((rows.collect(), still))
+    Ok((rows.collect(), still, jump))
 }
 
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let mut still = Vec::new();
+        let (mut still, mut jumps) = (Vec::new(), Vec::new());
         let moving = context.each(
             context.first(&SCENES, 1),
             |(address, ..)| short_name(address).to_owned(),
             |case| {
-                let (rows, of_case) = of_scene(context, &gpu, *case)?;
+                let (rows, of_case, jump) = of_scene(context, &gpu, *case)?;
                 still.push(of_case);
+                jumps.push(jump);
                 Ok(rows)
             },
         )?;
-        Ok(Self { moving, still })
+        Ok(Self { moving, still, jumps })
     }
 
     fn findings(&self) -> Findings {
@@ -371,6 +418,7 @@ impl Study for Found {
                 geometric_mean(pairs.iter().map(|pair| pair.faster)),
             )
             .and(Findings::of(&self.still, OF_STILL))
+            .and(Findings::of(&self.jumps, OF_JUMPS))
             .and(Findings::of(&self.moving, &[]))
             .note(format!(
                 "{0} × {0} pixels, {1} virtual lights with exact maps of {2}² texels, four by four tiles and their filter; {3} frames in which the lamp goes on, behind a first one that places all lights. \
