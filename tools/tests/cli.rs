@@ -493,8 +493,9 @@ fn a_time_budget_stops_early_and_says_so() -> Tested {
     ])?;
     let report = json_file(&path.with_extension("json"))?;
     assert_eq!(report["stopped_early"], Value::Bool(true));
-    let most = report["samples"][1].as_u64().unwrap_or(0);
-    assert!((1..100_000_000).contains(&most), "{most}");
+    // A busy machine ends no sample in that time.
+    let most = report["samples"][1].as_u64().unwrap_or(u64::MAX);
+    assert!(most < 100_000_000, "{most}");
     assert!(
         String::from_utf8_lossy(&output.stderr).contains("time is up"),
         "{}",

@@ -25,6 +25,9 @@ pub(crate) const PASSES: u32 = 12;
 /// Samples that a pass may have.
 const PASS_SAMPLES_MAX: u32 = 4096;
 
+/// Samples of a picture at most, of techniques with a bias whose every sample is a frame with lights of its own for all pixels: noise is far below their tolerance then.
+const FRAMES_MAX: u32 = 96;
+
 /// What the mean over a picture may be wrong by where so many photons light it.
 pub(crate) fn photon_tolerance(photons: f64) -> f64 {
     PHOTON_TOLERANCE / photons.sqrt()
@@ -131,6 +134,13 @@ impl<'a> Easel<'a> {
         Ok((law.shares_noise && !self.has_bias()).then_some(law.samples_a_pass))
     }
 
+    /// As many of the samples as tell what is judged.
+    fn enough(&self, spp: u32) -> Result<u32> {
+        let law = (self.info.foresight.law)(&self.settings())?;
+        let are_frames = law.shares_noise && self.has_bias() && !self.has("photons");
+        Ok(if are_frames { spp.min(FRAMES_MAX) } else { spp })
+    }
+
     fn settings(&self) -> Settings {
         Value::Object(self.settings.clone()).into()
     }
@@ -179,7 +189,7 @@ impl<'a> Easel<'a> {
             .pass_samples()?
             .map(|_| self.with("samples_per_pass", spp.min(PASS_SAMPLES_MAX)));
         let easel = shared.as_ref().unwrap_or(self);
-        let painted = finish(easel.prepare(scene, size)?.as_mut(), spp)?;
+        let painted = finish(easel.prepare(scene, size)?.as_mut(), self.enough(spp)?)?;
         Ok(Painted {
             tolerance: self.tolerance(spp),
             passes: shared.is_some().then(Vec::new),
@@ -197,7 +207,7 @@ impl<'a> Easel<'a> {
 
     /// Renders what was prepared to the end, or to that of its [`PASSES`] where pixels share the noise of each, and reads the picture.
     pub(crate) fn finish(&self, technique: &mut dyn Technique, spp: u32) -> Result<Painted> {
-        let tolerance = self.tolerance(spp);
+        let (tolerance, spp) = (self.tolerance(spp), self.enough(spp)?);
         let Some(each) = self.pass_samples()? else {
             let painted = finish(technique, spp)?;
             return Ok(Painted { tolerance, ..painted });
