@@ -16,7 +16,7 @@ pub struct ObjectTriangles {
     pub triangles: Range<u32>,
     /// Its material's factors, whatever its textures, make it a mirror, or give it a smooth layer that mirrors in part.
     pub mirrors: bool,
-    /// They let light through that smooth surface.
+    /// They let light through a smooth surface, one that mirrors or not.
     pub transmits: bool,
 }
 

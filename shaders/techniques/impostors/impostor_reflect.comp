@@ -28,14 +28,16 @@ layout(push_constant, scalar) uniform Push {
     vec3 place;           // of the map
     float tolerance;      // residual of what counts as found
     uint side;            // texels across and down
+    uint keeps;           // whether this wave's look-ups are kept, where KEEPS_LOOK_UPS says that any are
 } push;
 
 // Octahedron of directions, row by row without a border; layer of surfaces by layer.
 layout(set = 3, binding = 0, scalar) restrict readonly buffer MapRadiance { vec3 map_radiance[]; };
 layout(set = 3, binding = 1, scalar) restrict buffer ReflectionCounters {
-    uint reflections;
-    uint sky;      // rays that met nothing
-    uint unfound;  // searches that ended beside surfaces
+    uint reflections;  // rays of both kinds
+    uint refractions;  // the refracted ones
+    uint sky;          // rays that met nothing
+    uint unfound;      // searches that ended beside surfaces
 } reflection_counters;
 layout(set = 3, binding = 2, scalar) restrict writeonly buffer ReflectionRecords { ReflectionRecord reflection_records[]; };  // by slot
 
@@ -88,17 +90,25 @@ void follow(uint slot, WalkState path, Arrival a, ScatteringFrame frame, uint ki
     ImpostorHit found = reflected_hit(x, r);
     // A ray that is none finds nothing.
     if (dot(found.direction, found.direction) > 0.0) {
-        walk_gathered[slot].radiance += path.throughput * mirror.weight * map_look_up(IMPOSTOR_LAYERS > 1u ? found.layer : 0u, found.direction);
+        vec3 light = path.throughput * mirror.weight * map_look_up(IMPOSTOR_LAYERS > 1u ? found.layer : 0u, found.direction);
+        // What is infinitely far is seen as by the path tracer: nothing is absorbed of it.
+        bool enters = kind == REFLECTION_REFRACTED && a.solid && frame.wo.z > 0.0 && found.distance < IMPOSTOR_NOTHING;
+        walk_gathered[slot].radiance += absorbed(light, enters ? a.surface.material : OUTSIDE, found.distance);
     }
     bool searches = !REFLECTS_IN_BOX && IMPOSTOR_METHOD != IMPOSTOR_CLASSICAL;
     atomicAdd(reflection_counters.reflections, 1u);
+    if (kind == REFLECTION_REFRACTED) {
+        atomicAdd(reflection_counters.refractions, 1u);
+    }
     if (searches && found.distance >= IMPOSTOR_NOTHING) {
         atomicAdd(reflection_counters.sky, 1u);
     } else if (searches && !(found.residual < push.tolerance)) {
         atomicAdd(reflection_counters.unfound, 1u);
     }
-    if (KEEPS_LOOK_UPS) {
-        reflection_records[slot] = ReflectionRecord(x, found.residual, r, kind, found.direction);
+    if (KEEPS_LOOK_UPS && push.keeps != 0u) {
+        SurfacePoint point = a.surface.point;
+        vec3 start = offset_ray_origin(point.position, point.error, a.surface.geometric_normal, r);
+        reflection_records[slot] = ReflectionRecord(x, found.residual, r, kind, found.direction, start);
     }
 }
 
@@ -113,6 +123,8 @@ void reflect_at(uint slot, uint place) {
     if (arrival_is_unlit(a) || !bsdf_is_delta(a.bsdf)) {
         return;
     }
+    // One that begins inside a body learns it where it arrives, as the path tracer's do.
+    path.throughput = absorbed(path.throughput, arrival_interior(a, OUTSIDE), hit.t);
     ScatteringFrame frame = scattering_frame(a, arrival_normal(a));
     follow(slot, path, a, frame, REFLECTION_MIRRORED);
     if (REFRACTS) {

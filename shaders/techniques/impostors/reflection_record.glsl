@@ -14,6 +14,7 @@ struct ReflectionRecord {
     vec3 direction;
     uint kind;
     vec3 found;
+    vec3 start;  // off its surface, in the scene: where the path tracer's ray begins
 };
 
 #endif

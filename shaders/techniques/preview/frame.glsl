@@ -28,4 +28,14 @@ struct PreviewFrame {
     float probe_alphas[PROBE_LEVELS_MAX];
 };
 
+// The level of detail of a look-up for a lobe of width alpha, between the levels' own widths.
+float probe_level(PreviewFrame frame, float alpha) {
+    uint level = 0u;
+    while (level + 2u < frame.probe_levels && alpha >= frame.probe_alphas[level + 1u]) {
+        ++level;
+    }
+    float part = frame.probe_levels > 1u ? probe_part(alpha, frame.probe_alphas[level], frame.probe_alphas[level + 1u]) : 0.0;
+    return float(level) + part;
+}
+
 #endif

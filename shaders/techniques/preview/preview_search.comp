@@ -48,17 +48,6 @@ float impostor_distance(uint layer, vec3 v) {
     return distance;
 }
 
-// The level of a lobe of width alpha.
-float probe_level(float alpha) {
-    PreviewFrame frame = frames[0];
-    uint level = 0u;
-    while (level + 2u < frame.probe_levels && alpha >= frame.probe_alphas[level + 1u]) {
-        ++level;
-    }
-    float part = frame.probe_levels > 1u ? probe_part(alpha, frame.probe_alphas[level], frame.probe_alphas[level + 1u]) : 0.0;
-    return float(level) + part;
-}
-
 void main() {
     PreviewFrame frame = frames[0];
     uint i = invocation_index();
@@ -83,13 +72,16 @@ void main() {
     vec3 normal = adapt_shading_normal(surface_mapped_normal(m, s), facing, to_eye);
     float cos_o = dot(normal, to_eye);
     vec3 shine = microfacet_albedo(b, cos_o);
-    vec3 r = normalize(2.0 * cos_o * normal - to_eye);
-    ImpostorHit found = impostor_search(s.point.position - push.place, r, vec2(0.0, push.farthest), push.tolerance);
-    // A ray that is none finds nothing.
-    if (shine == vec3(0.0) || dot(found.direction, found.direction) == 0.0) {
+    if (shine == vec3(0.0)) {
         return;
     }
-    float level = probe_level(b.alpha);
+    vec3 r = normalize(2.0 * cos_o * normal - to_eye);
+    ImpostorHit found = impostor_search(s.point.position - push.place, r, vec2(0.0, push.farthest), push.tolerance);
+    // A ray that is none finds nothing, and what lies in the ray's own direction is there.
+    if (dot(found.direction, found.direction) == 0.0 || found.direction == r) {
+        return;
+    }
+    float level = probe_level(frame, b.alpha);
     vec3 change = shine * (directional_look_up(found.direction, level) - directional_look_up(r, level));
     uint target = frame.first_pixel + pixel.y * frame.stride + pixel.x;
     radiance[target] = max(radiance[target] + change, vec3(0.0));

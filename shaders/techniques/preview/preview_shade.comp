@@ -37,12 +37,7 @@ layout(push_constant, scalar) uniform Push {
 // Radiance from a unit direction of the map's axes, filtered by a lobe of width alpha.
 vec3 probe_look_up(vec3 d, float alpha) {
     PreviewFrame frame = frames[push.frame];
-    uint level = 0u;
-    while (level + 2u < frame.probe_levels && alpha >= frame.probe_alphas[level + 1u]) {
-        ++level;
-    }
-    float part = frame.probe_levels > 1u ? probe_part(alpha, frame.probe_alphas[level], frame.probe_alphas[level + 1u]) : 0.0;
-    return directional_look_up(d, float(level) + part);
+    return directional_look_up(d, probe_level(frame, alpha));
 }
 
 // What one light adds.

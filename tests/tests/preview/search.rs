@@ -177,14 +177,29 @@ fn searches_that_cannot_be_are_refused() {
         let error = SearchedReflections::new(gpu, &stage.on_device, live[1].probe(), &many).unwrap_err();
         assert!(error.to_string().contains("impostor steps"), "{error}");
         let searched = SearchedReflections::new(gpu, &stage.on_device, live[1].probe(), &search).unwrap();
-        let refused = |live: &LiveProbe, place: Vec3| {
+        let refused = |preview: &Preview, live: &LiveProbe, place: Vec3| {
             let mut recorder = gpu.recorder("refused").unwrap();
             let triangles = stage.on_device.surfaces().triangles_of(stage.object);
-            let (scene, preview) = (&stage.on_device, &stage.preview);
-            searched.record(&mut recorder, scene, preview, &camera(), triangles, (live, place))
+            searched.record(
+                &mut recorder,
+                &stage.on_device,
+                preview,
+                &camera(),
+                triangles,
+                (live, place),
+            )
         };
-        for (live, place, words) in [(&live[0], Vec3::ZERO, "no distances"), (&live[1], Vec3::NAN, "place")] {
-            let error = refused(live, place).unwrap_err();
+        let without = PreviewDesc {
+            has_probes: false,
+            ..stage.preview.desc()
+        };
+        let without = Preview::new(gpu, &stage.on_device, without).unwrap();
+        for (preview, live, place, words) in [
+            (&stage.preview, &live[0], Vec3::ZERO, "no distances"),
+            (&stage.preview, &live[1], Vec3::NAN, "place"),
+            (&without, &live[1], Vec3::ZERO, "has_probes is needed"),
+        ] {
+            let error = refused(preview, live, place).unwrap_err();
             assert!(
                 matches!(error, Error::Setting { .. }) && error.to_string().contains(words),
                 "{error}"

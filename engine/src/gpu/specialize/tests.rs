@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::words::first_word;
 use super::*;
-use crate::gpu::interface::ShaderInfo;
-use crate::gpu::shaders;
+use crate::gpu::interface::{ShaderInfo, SpecInfo};
+use crate::gpu::shaders::{self, constants as c};
 use crate::test_random::Random;
 
 // Ids of the module below.
@@ -281,13 +281,122 @@ fn truth_values(words: &[u32]) -> Vec<u32> {
         .collect()
 }
 
-/// Values for the truth values among a shader's constants: all off, and a mixture. Numbers stay, since not every one is a size that an array can have.
-fn choices(words: &[u32], random: &mut Random) -> [Vec<(u32, u32)>; 2] {
+/// Constants that choose among kinds and methods, and all their values.
+const KINDS: [(&str, &[u32]); 17] = [
+    (
+        "curve_form",
+        &[
+            c::CURVE_NOTHING,
+            c::CURVE_EXACT,
+            c::CURVE_SCHLICK,
+            c::CURVE_RESCALED,
+            c::CURVE_COMPENSATED,
+            c::CURVE_RESCALED_F0,
+            c::CURVE_COMPENSATED_F0,
+            c::CURVE_TINTED,
+            c::CURVE_SIMPLIFIED,
+            c::CURVE_TABLE,
+        ],
+    ),
+    (
+        "directional_kind",
+        &[
+            c::DIRECTIONAL_OCTAHEDRON,
+            c::DIRECTIONAL_OCTAHEDRON_RECTANGULAR,
+            c::DIRECTIONAL_EQUAL_AREA,
+            c::DIRECTIONAL_LAT_LONG,
+            c::DIRECTIONAL_CUBE,
+            c::DIRECTIONAL_PARABOLOID,
+            c::DIRECTIONAL_SPHERE,
+            c::DIRECTIONAL_NUSSELT,
+        ],
+    ),
+    ("edge_bound", &[c::EDGE_UNBOUNDED, c::EDGE_GEOMETRY, c::EDGE_DISTANCE]),
+    ("gather_form", &[c::GATHER_RATIO, c::GATHER_DISC, c::GATHER_NORMALS]),
+    (
+        "impostor_method",
+        &[
+            c::IMPOSTOR_CLASSICAL,
+            c::IMPOSTOR_PERPENDICULAR,
+            c::IMPOSTOR_FIXED_POINT,
+            c::IMPOSTOR_SECANT_FROM_POINT,
+            c::IMPOSTOR_SECANT_FROM_GUESS,
+            c::IMPOSTOR_FALSE_POSITION,
+            c::IMPOSTOR_MIXED,
+            c::IMPOSTOR_HYBRID,
+            c::IMPOSTOR_MARCH,
+        ],
+    ),
+    (
+        "index_kind",
+        &[c::INDEX_BVH2, c::INDEX_KD, c::INDEX_WIDE, c::INDEX_TWO_LEVEL],
+    ),
+    (
+        "kd_stack_cache",
+        &[c::KD_STACK_CACHE_NONE, c::KD_STACK_CACHE_HEAD, c::KD_STACK_CACHE_BYTES],
+    ),
+    ("operation", &[c::OPERATION_SUM, c::OPERATION_MIN, c::OPERATION_MAX]),
+    ("profile", &[c::KERNEL_UNIFORM, c::KERNEL_CONE, c::KERNEL_EPANECHNIKOV]),
+    ("queue", &[c::QUEUE_SLOTS, c::QUEUE_COMPACTED, c::QUEUE_BLOCKS]),
+    ("rsm_sequence", &[c::RSM_HALTON, c::RSM_HAMMERSLEY, c::RSM_RANDOM]),
+    (
+        "sampler_kind",
+        &[c::SAMPLER_SOBOL, c::SAMPLER_PCG, c::SAMPLER_JOINT_SOBOL],
+    ),
+    ("sat_numbers", &[c::SAT_FLOAT, c::SAT_TWO_FLOAT, c::SAT_FIXED]),
+    ("selection", &[c::SELECT_ALL, c::SELECT_POTENTIAL, c::SELECT_CUTS]),
+    ("shadow_kind", &[c::SHADOW_CUBE, c::SHADOW_OCTAHEDRON]),
+    (
+        "strategy",
+        &[
+            c::STRATEGY_COMBINED,
+            c::STRATEGY_EMISSION,
+            c::STRATEGY_LIGHT_SAMPLES,
+            c::STRATEGY_CONNECTIONS,
+            c::STRATEGY_SPLATS,
+        ],
+    ),
+    (
+        "visibility",
+        &[c::VISIBILITY_NONE, c::VISIBILITY_RAYS, c::VISIBILITY_MAPS],
+    ),
+];
+
+/// Values for the constants of a shader: its truth values all off, and as many mixtures of them as let each kind that a number chooses have its turn. Other numbers stay, since not every one is a size that an array can have.
+fn choices(shader: &ShaderInfo, words: &[u32], random: &mut Random) -> Vec<Vec<(u32, u32)>> {
     let mut truths = truth_values(words);
     truths.sort_unstable();
-    let off = truths.iter().map(|id| (*id, 0)).collect();
-    let mixture = truths.iter().map(|id| (*id, random.below(2) as u32)).collect();
-    [off, mixture]
+    let kinds: Vec<(u32, &[u32])> = shader.spec_constants.iter().filter_map(kind).collect();
+    let turns = kinds.iter().map(|(_, values)| values.len()).max().unwrap_or(1);
+    let mut all = vec![truths.iter().map(|id| (*id, 0)).collect()];
+    all.extend((0..turns).map(|turn| {
+        let mixture = truths.iter().map(|id| (*id, random.below(2) as u32));
+        let of_turn = kinds.iter().map(|(id, values)| (*id, values[turn % values.len()]));
+        mixture.chain(of_turn).collect()
+    }));
+    all
+}
+
+/// Number in the interface of a constant that chooses among kinds, and their values.
+fn kind(constant: &SpecInfo) -> Option<(u32, &'static [u32])> {
+    let (_, values) = KINDS.iter().find(|(name, _)| *name == constant.name)?;
+    Some((constant.id, values))
+}
+
+#[test]
+fn kinds_are_those_of_kernels() {
+    for (name, values) in KINDS {
+        let constants = shaders::ALL.iter().flat_map(|shader| shader.spec_constants);
+        let defaults: Vec<u32> = constants
+            .filter(|constant| constant.name == name)
+            .map(|constant| constant.default)
+            .collect();
+        assert!(!defaults.is_empty(), "{name}");
+        assert!(
+            defaults.iter().all(|value| values.contains(value)),
+            "{name}: {defaults:?}"
+        );
+    }
 }
 
 /// What `spirv-val` says of a module, with the options of `tests/tests/code/shaders.rs`; an error where it cannot be run.
@@ -322,7 +431,7 @@ fn spirv_val_accepts_specialized_kernels() {
     for shader in shaders::ALL {
         let words = words_of(shader);
         made.insert(words.clone());
-        for values in choices(&words, &mut random) {
+        for values in choices(shader, &words, &mut random) {
             let left = write(&words, &values, &mut Vec::new()).unwrap_or_else(|why| panic!("{}: {why}", shader.name));
             // What constants change nothing of is read as it is by the tests' crate.
             if made.insert(left.clone()) {

@@ -383,7 +383,7 @@ pub(in crate::techniques) fn middle_of(gpu: &Gpu, scene: &GpuScene, ranges: &[Ra
 }
 
 /// Least and greatest corner of that box.
-pub(super) fn bounds_of(gpu: &Gpu, scene: &GpuScene, ranges: &[Range<u32>]) -> Result<Option<[Vec3; 2]>> {
+fn bounds_of(gpu: &Gpu, scene: &GpuScene, ranges: &[Range<u32>]) -> Result<Option<[Vec3; 2]>> {
     let size = size_of::<SceneTriangle>() as u64;
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for range in ranges.iter().filter(|range| !range.is_empty()) {

@@ -111,7 +111,7 @@ const ROWS: &[Row] = &[
         id: "CL-IMPOSTOR",
         name: "technique `impostor`: direct light, and reflections of smooth surfaces by a distance impostor",
         role: Role::Technique,
-        limits: "Few layers of surfaces, by default one, so that what the map's place does not see is not there; reflecting bodies do not show in reflections, and what refracts has one interface.",
+        limits: "Few layers of surfaces, by default one, so that what the map's place does not see is not there; reflecting bodies do not show in reflections, and what refracts has one interface and absorbs nothing of the light on its way to what lies within.",
         sources: &[
             sources::SZIRMAY_KALOS_2005.whole(),
             sources::UMENHOFFER_2007.at("chapter 17"),
@@ -132,6 +132,8 @@ const ROWS: &[Row] = &[
             "tests/tests/impostor_pictures/edge_cases.rs::what_cannot_be_is_refused_by_name",
             "tests/tests/impostor_pictures/refractions.rs::second_interfaces_are_refused",
             "tests/tests/impostor_pictures/refractions.rs::a_pane_shows_what_lies_behind_it",
+            "tests/tests/impostor_pictures/refractions.rs::what_is_seen_in_a_pool_is_absorbed_on_the_way",
+            "engine/src/techniques/impostors/interfaces.rs::numbers_are_found_in_ranges_in_their_order",
             "tests/tests/impostor_pictures/edge_cases.rs::bits_are_the_same_whoever_does_the_work",
             "engine/src/techniques/impostors/settings.rs::bad_settings_are_refused_by_name",
             "engine/src/techniques/impostors/settings.rs::eye_paths_are_part_of_the_picture_and_bounces_are_those_of_the_map",

@@ -8,7 +8,7 @@
 //! the setting says, one by default, pictures have the paths `LE|L.E|L.SE`: light that is seen in a mirror comes from the map alone.
 //!
 //! Where a setting [says so](ReflectionSettings::refracts), what smooth glass lets through is followed as well, through the same map and at one interface: panes, and surfaces of bodies whose other side is none. Both rays have the weights of the
-//! exact dielectric factor, and beyond the critical angle all is mirrored. The refracted rays of each pixel's first sample are traced on: where one of them meets a second interface the picture is refused, since nothing is followed past the first.
+//! exact dielectric factor, and beyond the critical angle all is mirrored. A body that the refracted ray enters absorbs of it as far as what is found, and one that the eye is in on the way to its surface. The refracted rays of each pixel's first sample are traced on: where one of them meets a second interface the picture is refused, since nothing is followed past the first.
 //!
 //! The map is captured once, before the first sample, and holds for all cameras. What reflects is left out of it, so that it may be seen from within; its shadow is in it.
 //!
@@ -18,14 +18,15 @@
 //! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same.
 //! - Searches end beside surfaces: by how much, [`ImpostorReflections::counts`] and [`LookUp::residual`] say.
 //! - Radiance at texels' middles is joined bilinearly, so that borders of shadows are up to half a texel off; with a capture by rays its noise stays, and is the same for all seeds.
-//! - A second interface less than 2⁻¹⁴ of the width of what refracts behind the first, or one that no ray of the first samples meets, is passed over.
+//! - A second interface that no ray of the first samples meets is passed over.
+//! - Light on its way to what lies within a body that absorbs is not absorbed: in the map it is lit as if nothing were around it.
 //! - A surface that is smooth by a texture alone is not taken for one that reflects: it is in the map, and without others there is none.
 //! - Bodies that reflect do not show in reflections, their own included.
 //! - A rasterized map has the shadows, and their borders, of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), none of directional lights, and draws partial alpha opaque.
 //!
 //! In the limit of many texels and steps, what convex rooms of diffuse walls show in a convex mirror is exact.
 //!
-//! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit where nothing is refracted, second interfaces where it is, and scenes that keep their instances.
+//! Deterministic in settings and seed, on any number of threads. Refused are participating media, surfaces that transmit where nothing is refracted, second interfaces where it is, bodies that absorb where no distances are looked up, and scenes that keep their instances.
 
 pub(in crate::techniques) mod capture;
 mod card;

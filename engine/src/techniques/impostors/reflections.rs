@@ -10,7 +10,7 @@ use super::capture::{Capture, CaptureBy, CapturePlan, Captured, middle_of};
 use super::card::refusals_with;
 use super::interfaces::Interfaces;
 use super::renderer::{MapRenderer, MapUse, eye_settings};
-use super::settings::ReflectionSettings;
+use super::settings::{ReflectionMethod, ReflectionSettings};
 use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
@@ -53,37 +53,43 @@ struct LookUps {
 impl MapUse for LookUps {
     fn take(&mut self, gpu: &Gpu, scene: &GpuScene, captured: Captured, slots: u32) -> Result<()> {
         let (map, eye) = ((captured, self.place), (&self.eye, slots));
-        let reflections = Reflections::new(gpu, scene, &self.settings, map, eye, self.triangles.clone())?;
+        let (triangles, refracts) = (self.triangles.clone(), !self.refracting.is_empty());
+        let reflections = Reflections::new(gpu, scene, &self.settings, map, eye, triangles, refracts)?;
         self.reflections = Some(reflections);
-        if !self.refracting.is_empty() {
+        if refracts {
             self.interfaces = Some(Interfaces::new(gpu, scene, self.refracting.clone())?);
         }
         Ok(())
     }
 
-    fn stage<'a>(&'a self, scene: &'a GpuScene) -> Option<Box<dyn ArrivalStage + 'a>> {
-        let reflections = self.reflections.as_ref()?;
-        Some(Box::new(ReflectionStage { reflections, scene }))
+    fn stage<'a>(&'a self, scene: &'a GpuScene, is_first: bool) -> Option<Box<dyn ArrivalStage + 'a>> {
+        Some(Box::new(ReflectionStage {
+            reflections: self.reflections.as_ref()?,
+            scene,
+            keeps: is_first || self.settings.keeps_look_ups,
+        }))
     }
 
     fn count(&mut self, is_first: bool) -> Result<()> {
         let Some(reflections) = &self.reflections else {
             return Ok(());
         };
+        if let Some(interfaces) = self.interfaces.as_ref().filter(|_| is_first) {
+            interfaces.check(&reflections.refracted_rays()?)?;
+        }
         let counts = reflections.counts()?;
         self.counts.reflections += counts.reflections;
+        self.counts.refractions += counts.refractions;
         self.counts.sky += counts.sky;
         self.counts.unfound += counts.unfound;
-        match &self.interfaces {
-            Some(interfaces) if is_first => interfaces.check(self.place, &reflections.looked_up()?),
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         let map_bytes = self.reflections.as_ref().map_or(0, Reflections::bytes);
         BTreeMap::from([
             ("reflections", self.counts.reflections),
+            ("refractions", self.counts.refractions),
             ("reflections_of_sky", self.counts.sky),
             ("reflections_unfound", self.counts.unfound),
             ("map_bytes", map_bytes),
@@ -97,14 +103,15 @@ impl MapUse for LookUps {
     }
 }
 
-/// The objects that reflect, by a setting.
-fn reflectors(objects: &[ObjectTriangles], wanted: Option<u32>) -> Result<Vec<&ObjectTriangles>> {
-    let Some(number) = wanted else {
-        return Ok(objects.iter().filter(|object| object.mirrors).collect());
+/// The objects that reflect, or refract where that is followed, by the settings.
+fn reflectors<'a>(objects: &'a [ObjectTriangles], settings: &ReflectionSettings) -> Result<Vec<&'a ObjectTriangles>> {
+    let is_followed = |object: &ObjectTriangles| object.mirrors || (settings.refracts && object.transmits);
+    let Some(number) = settings.reflector else {
+        return Ok(objects.iter().filter(|object| is_followed(object)).collect());
     };
     let object = objects.iter().find(|object| object.object == number);
     let object = object.ok_or_else(|| Error::setting("reflector", number, "is the number of no visible object"))?;
-    if !object.mirrors {
+    if !is_followed(object) {
         return Err(Error::setting(
             "reflector",
             number,
@@ -118,7 +125,7 @@ impl ImpostorReflections {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a setting or size out of range, and for a reflector that is none; [`Error::Unsupported`] for a scene with participating media, with
+    /// [`Error::Setting`] for a setting or size out of range, for a reflector that is none, and for a method without distances where bodies absorb; [`Error::Unsupported`] for a scene with participating media, with
     /// surfaces that transmit, unless rays are to be [refracted](ReflectionSettings::refracts), or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
     /// [`Error::OutOfMemory`].
     pub fn new(
@@ -136,8 +143,12 @@ impl ImpostorReflections {
                 reasons,
             });
         }
+        if scene.profile().has_absorption && settings.method == ReflectionMethod::Classical {
+            let cause = "has no distances, along which bodies of the scene absorb light";
+            return Err(Error::setting("method", "classical", cause));
+        }
         let surfaces = scene.surfaces();
-        let reflectors = reflectors(surfaces.objects, settings.reflector)?;
+        let reflectors = reflectors(surfaces.objects, &settings)?;
         let triangles_of = |objects: &[&ObjectTriangles]| -> Vec<Range<u32>> {
             let ranges = objects.iter().map(|object| object.triangles.clone());
             ranges.filter(|range| !range.is_empty()).collect()
@@ -215,7 +226,7 @@ impl ImpostorReflections {
     /// Does a bounded piece of work towards `samples` samples per pixel: a piece of the map, or a submission of eye paths; `None` when all samples are there.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] where refracted rays of a pixel's first sample meet a second interface; [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
+    /// [`Error::Unsupported`] where refracted rays of a pixel's first sample meet a second interface, from then on until there is [another camera](Self::set_camera); [`Error::DeviceLost`], [`Error::OutOfMemory`], [`Error::Overflow`] should the index have rays that never end.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
         self.renderer.step(samples)
     }

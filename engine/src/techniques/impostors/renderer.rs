@@ -20,9 +20,9 @@ use crate::walk::ArrivalStage;
 pub(in crate::techniques) trait MapUse: Send {
     /// Takes the map, for eye paths of so many slots.
     fn take(&mut self, gpu: &Gpu, scene: &GpuScene, captured: Captured, slots: u32) -> Result<()>;
-    /// The stage of a wave; `None` before there is a map, or where there is none.
-    fn stage<'a>(&'a self, scene: &'a GpuScene) -> Option<Box<dyn ArrivalStage + 'a>>;
-    /// Adds the counts of a wave that has ended, and looks at what it met; `is_first` for one of pixels' first samples.
+    /// The stage of a wave, `is_first` for one of pixels' first samples; `None` before there is a map, or where there is none.
+    fn stage<'a>(&'a self, scene: &'a GpuScene, is_first: bool) -> Option<Box<dyn ArrivalStage + 'a>>;
+    /// Looks at what a wave that has ended met, `is_first` as above, and adds its counts. One that fails is asked for again, before the next wave.
     fn count(&mut self, is_first: bool) -> Result<()>;
     fn counters(&self) -> BTreeMap<&'static str, u64>;
     fn pipelines(&self) -> Vec<PipelineInfo>;
@@ -59,6 +59,8 @@ pub(in crate::techniques) struct MapRenderer<U> {
     /// Work of the map: submissions, and what they have traced.
     capture_steps: u64,
     capture_counts: CaptureCounts,
+    /// A wave that has ended and is not counted yet: whether it is one of pixels' first samples. What it met may refuse the picture, which stays refused then.
+    uncounted: Option<bool>,
     pub map_use: U,
 }
 
@@ -73,12 +75,14 @@ impl<U: MapUse> MapRenderer<U> {
             captured_by: Vec::new(),
             capture_steps: 0,
             capture_counts: CaptureCounts::default(),
+            uncounted: None,
             map_use,
         }
     }
 
     /// A piece of the map, or a submission of eye paths.
     pub fn step(&mut self, samples: u32) -> Result<Option<Step>> {
+        self.count()?;
         if self.eye.samples_done() >= samples && !self.eye.is_within_wave() {
             return Ok(None);
         }
@@ -94,16 +98,26 @@ impl<U: MapUse> MapRenderer<U> {
             }
             return Ok(Some(self.eye.step_so_far(timings, samples)));
         }
-        let stage = self.map_use.stage(&self.scene);
         let is_first = self.eye.samples_done() == 0;
+        let stage = self.map_use.stage(&self.scene, is_first);
         let step = self.eye.step_with(samples, stage.as_deref())?;
         let looks_up = stage.is_some();
         drop(stage);
         // They are those of a whole wave.
         if looks_up && step.is_some() && !self.eye.is_within_wave() {
-            self.map_use.count(is_first)?;
+            self.uncounted = Some(is_first);
+            self.count()?;
         }
         Ok(step)
+    }
+
+    /// Counts a wave that has ended.
+    fn count(&mut self) -> Result<()> {
+        if let Some(is_first) = self.uncounted {
+            self.map_use.count(is_first)?;
+            self.uncounted = None;
+        }
+        Ok(())
     }
 
     pub fn picture(&mut self) -> Result<(Picture, NonFiniteSamples)> {
@@ -116,7 +130,9 @@ impl<U: MapUse> MapRenderer<U> {
 
     /// The map does not depend on the camera.
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        self.eye.set_camera(camera)
+        self.eye.set_camera(camera)?;
+        self.uncounted = None;
+        Ok(())
     }
 
     pub fn counters(&self) -> BTreeMap<&'static str, u64> {

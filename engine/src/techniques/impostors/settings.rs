@@ -12,7 +12,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ReflectionMethod {
-    /// In the ray's own direction, as if all were infinitely far: no distances.
+    /// In the ray's own direction, as if all were infinitely far: no distances, so that bodies that absorb are refused.
     Classical,
     /// Where the ray leaves the box about the scene: no distances. Exact in an empty box.
     Box,
@@ -109,7 +109,7 @@ crate::settings! {
         pub capture_samples: u32 = 16, in 1..=65_536, unit "samples";
         /// Smooth surfaces that transmit show what lies along the refracted ray, too, past one interface.
         ///
-        /// Without it scenes with such surfaces are refused, and with it pictures in which refracted rays meet a second one: most solid bodies. Light paths are the same, with transmission among the specular scatterings.
+        /// Without it scenes with such surfaces are refused, and with it pictures in which refracted rays meet a second one: most solid bodies. Light paths are the same, with transmission among the specular scatterings. Bodies absorb along refracted rays, and light on its way to what lies within them is not absorbed.
         pub refracts: bool = false;
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
         pub sampler: SamplerKind = SamplerKind::Sobol;

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::capture::Captured;
 use super::settings::{ReflectionMethod, ReflectionSettings};
 use crate::Result;
+use crate::accel::Ray;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL, REFLECTION_NONE, REFLECTION_REFRACTED,
@@ -41,6 +42,8 @@ pub struct LookUp {
 pub struct LookUpCounts {
     /// Reflected and refracted rays.
     pub reflections: u64,
+    /// The refracted ones.
+    pub refractions: u64,
     /// Those that left to the sky.
     pub sky: u64,
     /// Those whose search ended farther from a surface than the tolerance.
@@ -66,7 +69,7 @@ pub(super) struct Reflections {
 }
 
 impl Reflections {
-    /// For eye paths of the set `eye`, up to `slots` at once, that arrive at some triangles.
+    /// For eye paths of the set `eye`, up to `slots` at once, that arrive at some triangles. Waves' look-ups can be kept where the settings say so, and where `refracts`.
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
@@ -74,6 +77,7 @@ impl Reflections {
         (captured, place): (Captured, Vec3),
         (eye, slots): (&PathSet, u32),
         triangles: Range<u32>,
+        refracts: bool,
     ) -> Result<Self> {
         let search = settings.search();
         let impostor = captured
@@ -81,7 +85,6 @@ impl Reflections {
             .as_ref()
             .map(|image| Impostor::new(gpu, image))
             .transpose()?;
-        let refracts = settings.refracts && scene.profile().has_transmission();
         // Refracted rays are traced on.
         let keeps_look_ups = settings.keeps_look_ups || refracts;
         let spec = surface_spec!(kernel, scene, {
@@ -97,7 +100,8 @@ impl Reflections {
             impostor_planes: impostor.is_some(),
             reflects_in_box: settings.method == ReflectionMethod::Box,
             keeps_look_ups,
-            refracts,
+            // By textures surfaces may be smooth, too.
+            refracts: settings.refracts && scene.profile().has_transmission(),
             ..Default::default()
         });
         let bytes = size_of::<Counters>() as u64;
@@ -135,19 +139,38 @@ impl Reflections {
         let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
         Ok(LookUpCounts {
             reflections: counters.reflections.into(),
+            refractions: counters.refractions.into(),
             sky: counters.sky.into(),
             unfound: counters.unfound.into(),
         })
     }
 
-    /// What the last wave has looked up, by slot; nothing where that is not kept.
-    pub fn looked_up(&self) -> Result<Vec<LookUp>> {
+    /// What is kept of the last wave that kept any, slot by slot.
+    fn kept(&self) -> Result<Vec<Record>> {
         let Some(records) = &self.records else {
             return Ok(Vec::new());
         };
         let count = (records.bytes() / size_of::<Record>() as u64) as usize;
-        let records: Vec<Record> = self.gpu.read(records.view(), count)?;
-        let used = (0..).zip(records).filter(|(_, record)| record.kind != REFLECTION_NONE);
+        self.gpu.read(records.view(), count)
+    }
+
+    /// The refracted rays of the last wave that kept its look-ups, from where the path tracer's would begin.
+    pub fn refracted_rays(&self) -> Result<Vec<Ray>> {
+        let ray = |record: &Record| Ray {
+            origin: record.start,
+            t_min: 0.0,
+            direction: record.direction,
+            t_max: f32::INFINITY,
+        };
+        let kept = self.kept()?;
+        let refracted = kept.iter().filter(|record| record.kind == REFLECTION_REFRACTED);
+        Ok(refracted.map(ray).collect())
+    }
+
+    /// What the last wave has looked up, by slot; nothing where that is not kept.
+    pub fn looked_up(&self) -> Result<Vec<LookUp>> {
+        let kept = (0..).zip(self.kept()?);
+        let used = kept.filter(|(_, record)| record.kind != REFLECTION_NONE);
         Ok(used
             .map(|(slot, record)| LookUp {
                 slot,
@@ -165,6 +188,8 @@ impl Reflections {
 pub(super) struct ReflectionStage<'a> {
     pub reflections: &'a Reflections,
     pub scene: &'a GpuScene,
+    /// Whether look-ups are kept, where they can be.
+    pub keeps: bool,
 }
 
 impl ReflectionStage<'_> {
@@ -179,6 +204,7 @@ impl ReflectionStage<'_> {
             place: r.place.to_array(),
             tolerance: r.tolerance,
             side: r.side,
+            keeps: self.keeps.into(),
         }
     }
 
@@ -218,7 +244,7 @@ impl ArrivalStage for ReflectionStage<'_> {
     }
 
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
-        if let Some(records) = &self.reflections.records {
+        if let Some(records) = self.reflections.records.as_ref().filter(|_| self.keeps) {
             pass.fill(records.view(), 0)?;
         }
         pass.update(self.reflections.counters.view(), &[Counters::default()])

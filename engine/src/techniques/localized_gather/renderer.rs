@@ -60,7 +60,7 @@ impl MapUse for Gathering {
         Ok(())
     }
 
-    fn stage<'a>(&'a self, scene: &'a GpuScene) -> Option<Box<dyn ArrivalStage + 'a>> {
+    fn stage<'a>(&'a self, scene: &'a GpuScene, _is_first: bool) -> Option<Box<dyn ArrivalStage + 'a>> {
         let gather = self.gather.as_ref()?;
         Some(Box::new(LocalizedStage { gather, scene }))
     }

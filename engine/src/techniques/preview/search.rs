@@ -4,10 +4,11 @@
 //! [`maps::impostor`](crate::maps::impostor), in the distances and normals that a [`LiveProbe`] was drawn with. The probe is looked up in the direction that was found, at the level of the surface's roughness.
 //!
 //! It is a pass of its own behind the preview's shading, of a module of its own: a preview without it has not a binding, a byte or a branch for it. The shading has added what the probe shows in the mirrored ray's own
-//! direction; the pass adds what it shows in the other one, and takes that away. What a diffuse base throws back stays as it is.
+//! direction; the pass adds what it shows in the other one, and takes that away. What a diffuse base throws back stays as it is. Sum and difference are rounded to f32: a pixel is off by up to a few 2⁻²⁴ of the greater of what the probe shows in both
+//! directions, which where the ray's own shows a lamp 10⁴ times as bright as what was found is up to two parts in 10³ of that. What comes below 0 is 0.
 //!
 //! Bias: that of a distance impostor of one layer (what the probe's place does not see is not there, and searches end beside surfaces) in place of [`LiveProbe`]'s parallax; rough lobes are filtered as they are seen from the
-//! probe's place. Where nothing is met, and where the map is seen from its own place, nothing changes but by rounding. Deterministic.
+//! probe's place. Where nothing is met nothing changes, and where the map is seen from its own place nothing but by rounding. Deterministic.
 
 use std::ops::Range;
 
@@ -69,11 +70,11 @@ impl SearchedReflections {
         self.pipeline.info()
     }
 
-    /// Records one pass behind [`Preview::record`] of the same scene and camera, and behind [`LiveProbe::record`]: triangles that were shaded by the probe, by numbers as those of a [`PreviewPart`], mirror what a search in its
-    /// distances finds. `place` is where the probe was drawn, metres.
+    /// Records one pass behind [`Preview::record`] of the same scene and camera, and behind [`LiveProbe::record`]: triangles of a part that this same probe has lit, by numbers as those of its
+    /// [`PreviewPart`], mirror what a search in its distances finds; from others it would take away light that was never added. `place` is where the probe was drawn, metres.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a camera that cannot be used, a place that is not finite, a probe without distances ([`LiveProbe::with_distances`]), and a scene with other features than those that it was made for;
+    /// [`Error::Setting`] for a camera that cannot be used, a place that is not finite, a probe without distances ([`LiveProbe::with_distances`]), a preview without probes ([`PreviewDesc::has_probes`](super::PreviewDesc::has_probes)), and a scene with other features than those that it was made for;
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn record(
         &self,
@@ -90,6 +91,11 @@ impl SearchedReflections {
         if spec(scene, live.probe(), &self.search) != self.spec {
             let cause = "has other features than that which the search was made for";
             return Err(Error::setting("scene or probe", "given", cause));
+        }
+        if !preview.desc().has_probes {
+            let cause =
+                "lights nothing by probes, and a search is for what they have shown; PreviewDesc::has_probes is needed";
+            return Err(Error::setting("preview", "given", cause));
         }
         let (seen_from, around) = (&preview.drawing.gbuffer, live.gbuffer());
         let image = |output| around.image(output);

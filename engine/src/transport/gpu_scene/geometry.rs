@@ -59,9 +59,10 @@ fn mirrors(material: &Material) -> bool {
     reflects && !material.unlit && Bsdf::from_material(material).is_delta()
 }
 
-/// Whether they let light through a smooth layer.
+/// Whether they let light through a smooth surface, with a layer or without.
 fn transmits(material: &Material) -> bool {
-    mirrors(material) && material.metallic < 1.0 && material.transmission > 0.0
+    let bsdf = Bsdf::from_material(material);
+    !material.unlit && bsdf.is_delta() && bsdf.metallic < 1.0 && bsdf.transmission > 0.0
 }
 
 /// The triangles of each instance that is visible, from the first triangle on.
@@ -308,6 +309,41 @@ mod tests {
         for (i, length) in [1.0, 0.0, 1.0].into_iter().enumerate() {
             let [x, y, z, _] = stored.normals[i];
             assert!((Vec3::new(x, y, z).length() - length).abs() < 1e-6, "{i}");
+        }
+    }
+
+    #[test]
+    fn smooth_surfaces_mirror_transmit_or_both() {
+        let glass = Material::glass("glass", 1.5);
+        let bare = Material {
+            specular: 0.0,
+            ..glass.clone()
+        };
+        let rough = Material {
+            roughness: 0.3,
+            ..glass.clone()
+        };
+        let closed = Material {
+            ior: 0.0,
+            ..glass.clone()
+        };
+        let unlit = Material {
+            unlit: true,
+            ..glass.clone()
+        };
+        let metal = Material {
+            metallic: 1.0,
+            ..glass.clone()
+        };
+        for (material, expected) in [
+            (glass, [true, true]),
+            (bare, [false, true]),
+            (rough, [false, false]),
+            (closed, [true, false]),
+            (unlit, [false, false]),
+            (metal, [true, false]),
+        ] {
+            assert_eq!([mirrors(&material), transmits(&material)], expected, "{material:?}");
         }
     }
 
