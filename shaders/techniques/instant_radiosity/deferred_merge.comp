@@ -15,12 +15,11 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "maps/packed_direction.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
+#include "techniques/instant_radiosity/light_color.glsl"
 #include "techniques/instant_radiosity/split_place.glsl"
 
 layout(constant_id = 145) const bool FILTERS = true;
 layout(constant_id = 146) const bool ADDS = true;  // to what the picture has already
-
-const uint SHADING_NORMAL_BITS = 16u;  // of each coordinate, as Output::Normals has them
 
 layout(push_constant, scalar) uniform Push {
     uint width;
@@ -47,9 +46,6 @@ vec3 merged(uint place) {
     uvec2 of_subset = interleave_lights(tile % push.subsets, push.subsets, push.lights);
     return split_states[place].sum * (push.scale * (float(push.lights) / float(of_subset.y - of_subset.x)));
 }
-
-// By what light is divided before it is averaged: a surface's colour, and nothing where it has none.
-vec3 divisor(vec3 color) { return mix(vec3(1.0), color, greaterThan(color, vec3(0.0))); }
 
 // 1 for bands in which both colours are something, or both nothing: what one shows of the light there tells of the other.
 vec3 alike(vec3 a, vec3 b) { return vec3(equal(greaterThan(a, vec3(0.0)), greaterThan(b, vec3(0.0)))); }

@@ -6,6 +6,7 @@ use glam::DVec2;
 
 use super::kernels::{Sight, seen_from};
 use super::maps::Maps;
+use super::past::Past;
 use super::reflective::{LightView, Reflective};
 use super::renderer::{Indirect, LightSource, ManyLight};
 use crate::gpu::shaders::types::SeenFrom;
@@ -66,6 +67,8 @@ enum Stage {
     },
     /// Back to the picture, from that pixel on.
     Merge(u32),
+    /// Blended with the frame before, from that pixel on.
+    Blend(u32),
     Ended,
 }
 
@@ -107,7 +110,7 @@ impl ManyLight {
             Some(Indirect {
                 source: LightSource::Walks(tracer),
                 ..
-            }) => Stage::Walks(Box::new(tracer.begin(self.done, None))),
+            }) => Stage::Walks(Box::new(tracer.begin(self.number(), None))),
             Some(Indirect {
                 source: LightSource::Kept(_),
                 ..
@@ -150,6 +153,7 @@ impl ManyLight {
             Stage::Maps { first, from } => self.draw_maps(frame, first, from)?,
             Stage::Gather { lights, place, sweeps } => self.gather(frame, lights, place, sweeps)?,
             Stage::Merge(pixel) => self.merge(frame, pixel)?,
+            Stage::Blend(pixel) => self.blend(frame, pixel)?,
             Stage::Ended => (Vec::new(), Stage::Ended),
         };
         frame.stage = next;
@@ -195,6 +199,10 @@ impl ManyLight {
     fn placed(&mut self, frame: &mut Frame, lights: u32) -> Result<Stage> {
         (frame.lights, self.placed) = (lights, lights);
         self.counts.lights += u64::from(lights);
+        if let (Some(indirect), 0) = (&mut self.indirect, lights) {
+            // Light that is gone is gone at once.
+            indirect.past.iter_mut().for_each(Past::forget);
+        }
         if let Some(Indirect {
             source,
             maps: Some(maps),
@@ -218,7 +226,7 @@ impl ManyLight {
 
     /// What the maps of a frame are drawn from, and the views of that.
     fn emit(&mut self) -> Result<(Vec<Timings>, Stage)> {
-        let number = self.done;
+        let number = self.number();
         let timings = self.submit(|own, recorder| match own.reflective() {
             Some(reflective) => reflective.record_emitters(recorder, &own.scene, number),
             None => Ok(()),
@@ -268,7 +276,7 @@ impl ManyLight {
         if views == 0 {
             return Ok((Vec::new(), self.placed(frame, 0)?));
         }
-        let number = self.done;
+        let number = self.number();
         let timings = self.submit(|own, recorder| match own.reflective() {
             Some(reflective) => reflective.record_lights(recorder, &own.scene, views, number),
             None => Ok(()),
@@ -517,11 +525,17 @@ impl ManyLight {
         let at_once = self.indirect.as_ref().filter(|_| merges);
         let at_once = at_once.map_or(all, |indirect| indirect.split.pixels);
         let end = first.saturating_add(at_once).min(all);
+        let blends = merges && self.past().is_some();
         let timings = self.submit(|own, recorder| {
             if let (Some(indirect), Some(seen), true) = (&own.indirect, &own.seen, merges) {
+                let target = indirect.past.as_ref().map_or(&own.radiance, Past::light);
                 recorder.pass("many-light: merge", |pass| {
                     let split = &indirect.split;
-                    split.record_merge(pass, seen, frame.lights, first..end, &own.radiance)
+                    split.record_merge(pass, seen, frame.lights, first..end, target)?;
+                    if blends {
+                        pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+                    }
+                    Ok(())
                 })?;
             } else if own.direct.is_none() && frame.views == 0 {
                 recorder.pass("many-light: black", |pass| {
@@ -530,12 +544,48 @@ impl ManyLight {
                     Ok(())
                 })?;
             }
+            if end < all || blends {
+                return Ok(());
+            }
+            own.film.record_frame(recorder, &own.radiance)
+        })?;
+        let next = match (end < all, blends) {
+            (true, _) => Stage::Merge(end),
+            (false, true) => Stage::Blend(0),
+            (false, false) => Stage::Ended,
+        };
+        Ok((timings, next))
+    }
+
+    /// Indirect light of a part of the pixels with that of the frame before, to the picture.
+    fn blend(&mut self, frame: &Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
+        let all = self.pixels();
+        let at_once = self.past().map_or(all, |past| past.pixels);
+        let end = first.saturating_add(at_once).min(all);
+        let timings = self.submit(|own, recorder| {
+            let (Some(indirect), Some(seen)) = (&own.indirect, &own.seen) else {
+                return Ok(());
+            };
+            let Some(past) = &indirect.past else {
+                return Ok(());
+            };
+            recorder.pass("many-light: blend", |pass| {
+                let colors = indirect.split.colors();
+                past.record(pass, seen, frame.from, colors, first..end, &own.radiance)?;
+                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
+                Ok(())
+            })?;
             if end < all {
                 return Ok(());
             }
             own.film.record_frame(recorder, &own.radiance)
         })?;
-        let next = if end < all { Stage::Merge(end) } else { Stage::Ended };
-        Ok((timings, next))
+        if end < all {
+            return Ok((timings, Stage::Blend(end)));
+        }
+        if let Some(past) = self.indirect.as_mut().and_then(|indirect| indirect.past.as_mut()) {
+            past.keep(frame.from);
+        }
+        Ok((timings, Stage::Ended))
     }
 }
