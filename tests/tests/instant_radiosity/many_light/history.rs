@@ -436,6 +436,17 @@ fn histories_cost_what_they_keep_and_nothing_where_there_are_none() {
         let (_, bytes, has_kernel) = once(&filtered);
         assert!(!has_kernel);
         assert_eq!(history(0.9, filtered), (7, bytes + (4 + 12 + 2 * 36) * 128, true));
+        // A first frame is what it is without.
+        for settings in [
+            exact(),
+            ManyLightSettings {
+                filter: true,
+                ..exact()
+            },
+        ] {
+            let frame = |settings: &ManyLightSettings| bits(&picture(gpu, &scene, [16, 8], settings, 1));
+            assert!(frame(&constant(0.9, settings.clone())) == frame(&settings));
+        }
         // Where nothing of virtual lights is shown nothing is kept.
         let without = once(&of(UP_TO_ONCE, exact()));
         assert_eq!(history(0.9, of(UP_TO_ONCE, exact())), without);
