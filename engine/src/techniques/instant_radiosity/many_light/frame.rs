@@ -199,10 +199,6 @@ impl ManyLight {
     fn placed(&mut self, frame: &mut Frame, lights: u32) -> Result<Stage> {
         (frame.lights, self.placed) = (lights, lights);
         self.counts.lights += u64::from(lights);
-        if let (Some(indirect), 0) = (&mut self.indirect, lights) {
-            // Light that is gone is gone at once.
-            indirect.past.iter_mut().for_each(Past::forget);
-        }
         if let Some(Indirect {
             source,
             maps: Some(maps),
@@ -552,7 +548,12 @@ impl ManyLight {
         let next = match (end < all, blends) {
             (true, _) => Stage::Merge(end),
             (false, true) => Stage::Blend(0),
-            (false, false) => Stage::Ended,
+            (false, false) => {
+                // Light that is gone is gone at once.
+                let past = self.indirect.iter_mut().filter_map(|indirect| indirect.past.as_mut());
+                past.for_each(Past::forget);
+                Stage::Ended
+            }
         };
         Ok((timings, next))
     }

@@ -120,8 +120,8 @@ crate::settings! {
         pub filter_plane: f32 = 0.01, in 0.0..=1.0;
         /// Cosine of the angle between normals above which it does.
         pub filter_normal: f32 = 0.9, in -1.0..=1.0;
-        /// Blends the indirect light of a frame with that of the frame before where this showed the same surface: the greatest share of the latter; 0 has no history. Values of 0.9 to 0.97 suit
-        /// frames that are shown one by one, each behind [`ManyLight::set_camera`](super::ManyLight::set_camera), with moving lamps or a moving camera; pictures of many frames gain nothing.
+        /// Blends the indirect light of a frame with that of the frame before where this showed the same surface: the greatest share of the latter, 0 for no history. Shares of 0.9 to 0.97 suit
+        /// frames that are shown one by one; a picture that is the mean of many gains nothing.
         ///
         /// Source: C. Sun, "Many-Light Real-Time Global Illumination using Sparse Voxel Octree", 2015, §2.2.4.
         pub history: f32 = 0.0, in 0.0..=0.99;
