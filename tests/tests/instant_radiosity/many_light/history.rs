@@ -2,7 +2,7 @@
 //!
 //! Virtual lights that are kept make frames without noise, in which a history is all that changes.
 
-use super::kept::{Moving, kept, lit_by, point, spot};
+use super::kept::{Moving, kept, lit_by, point, seeds, spot};
 use super::*;
 use clerestory::techniques::instant_radiosity::many_light::Gathering;
 
@@ -93,6 +93,19 @@ fn noise_falls_as_the_closed_form_says() {
                 "{c}: {found} instead of {formula}"
             );
         }
+    });
+}
+
+/// On a film frames with a history are not independent, but where nothing moves but the place within a pixel their mean is the path tracer's, by Student's t over seeds; a hundredth is for light that is
+/// looked up at one side of an edge alone.
+#[test]
+fn means_over_seeds_are_the_path_tracers() {
+    with_gpu(|gpu| {
+        let scene = hall();
+        let reference = traced_set(gpu, &scene, 2048, INDIRECT);
+        let settings = constant(0.9, of(INDIRECT, exact()));
+        let found = seeds(gpu, &scene, &settings, 6, 48);
+        found.expect_same_as("frames with a history", &reference, 0.01);
     });
 }
 

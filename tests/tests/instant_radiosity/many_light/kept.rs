@@ -221,13 +221,13 @@ fn kept_lights_have_all_of_the_power() {
     });
 }
 
-/// Every picture is of another seed, and so independent of the others.
-fn seeds(gpu: &Gpu, scene: &Scene, settings: &ManyLightSettings, count: u32) -> Passes {
+/// Every picture, of so many frames, is of another seed, and so independent of the others.
+pub(super) fn seeds(gpu: &Gpu, scene: &Scene, settings: &ManyLightSettings, each: u32, count: u32) -> Passes {
     let mut renderer = frames(gpu, scene, SIZE, settings);
     let pictures: Vec<Vec<f32>> = (0..count)
         .map(|seed| {
             renderer.restart(100 + seed).expect("another seed");
-            let [radiance, _] = advance(&mut renderer, 1);
+            let [radiance, _] = advance(&mut renderer, each);
             radiance
         })
         .collect();
@@ -264,7 +264,7 @@ fn means_over_seeds_are_the_path_tracers() {
                 interleave,
                 ..of(INDIRECT, kept())
             };
-            let found = seeds(gpu, scene, &settings, 64);
+            let found = seeds(gpu, scene, &settings, 1, 64);
             found.expect_same_as(&format!("{interleave} tiles a side"), &reference, bias);
         }
     });

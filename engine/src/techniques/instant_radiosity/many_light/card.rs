@@ -407,6 +407,7 @@ const ROWS: &[Row] = &[
             "engine/src/techniques/instant_radiosity/many_light/history.rs::changes_are_relative_and_bounds_scale",
             "tests/tests/twins/history.rs::histories_agree_with_their_twins",
             "tests/tests/instant_radiosity/many_light/history.rs::noise_falls_as_the_closed_form_says",
+            "tests/tests/instant_radiosity/many_light/history.rs::means_over_seeds_are_the_path_tracers",
             "tests/tests/instant_radiosity/many_light/history.rs::steps_of_light_arrive_as_powers_of_the_confidence",
             "tests/tests/instant_radiosity/many_light/history.rs::what_was_hidden_has_no_confidence",
             "tests/tests/instant_radiosity/many_light/history.rs::ghosts_stay_near_what_was_hidden",
