@@ -396,6 +396,7 @@ fn the_keys_of_many_lights_change_its_frames() {
         "visibility Rays",
         "bound Geometry",
         "filter on",
+        "history off",
         "all light",
     ] {
         assert!(text.contains(expected), "no {expected:?} in {text}");
@@ -418,12 +419,13 @@ fn the_keys_of_many_lights_change_its_frames() {
         light(&through),
         light(&indirect)
     );
-    let (_, text) = shown("vvppb+f");
+    let (_, text) = shown("vvppb+fh");
     for expected in [
         "128 walks",
         "visibility None",
         "bound Distance",
         "filter off",
+        "history on",
         "light of virtual lights",
     ] {
         assert!(text.contains(expected), "no {expected:?} in {text}");

@@ -12,6 +12,7 @@ const bool SEPARABLE_MASKING = false;
 #include "accel/triangle.glsl"
 #include "film/two_float.glsl"
 #include "techniques/bidirectional/bdpt_mis.glsl"
+#include "techniques/instant_radiosity/history.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/resampling.glsl"
 #include "transport/edge_bound.glsl"
@@ -192,7 +193,23 @@ void main() {
         out2(6u, vec2(mis_behind(w, in1(6u)), mis_weight(in1(0u), in1(1u))));
         break;
     }
-    case 17u: {  // eight candidates, one after the other
+    case 17u: {  // light of the frame before
+        SeenFrom from = SeenFrom(in3(0u), in_bits(30u), in3(3u), in_bits(31u), in3(6u), in_bits(29u), in3(9u));
+        vec2 place;
+        out_bits(9u, history_place(from, in3(12u), place) ? 1u : 0u);
+        out2(0u, place);
+        ivec2 first;
+        vec4 weights = history_weights(in2(15u), first);
+        out3(2u, weights.xyz);
+        out1(5u, weights.w);
+        out_bits(10u, uint(first.x));
+        out_bits(11u, uint(first.y));
+        out1(6u, history_change(in1(24u), in1(25u)));
+        out1(7u, history_confidence(in1(17u), in3(18u), in3(21u)));
+        out1(8u, history_bound(in1(26u), in1(27u), in1(28u)));
+        break;
+    }
+    case 18u: {  // eight candidates, one after the other
         float sum = 0.0;
         for (uint i = 0u; i < 8u; ++i) {
             out_bits(i, resample(in1(2u * i), in1(2u * i + 1u), sum) ? 1u : 0u);

@@ -1,12 +1,12 @@
 //! A window on a scene whose lamp moves, lit anew in every frame by many virtual lights.
 //!
 //! `many_lights [SCENE] [--lights N] [--placement walks|rsm|incremental|metropolis] [--visibility none|rays|maps] [--bound none|geometry|distance] [--interleave TILES]
-//! [--turn DEGREES] [--camera NAME] [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--keys KEYS] [--screenshot FILE]`
+//! [--history SHARE] [--turn DEGREES] [--camera NAME] [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--keys KEYS] [--screenshot FILE]`
 //!
 //! Each frame the lamp goes around the middle of the scene by `--turn`, its virtual lights are left anew where its light lands, and every pixel gathers the light
 //! of its part of them; with `--placement incremental` those that the lamp still sees stay where they are, with `metropolis` chains choose them among more. Space holds the lamp, and the picture converges. V goes on
 //! to the next way to tell who sees a virtual light, B to the next bound of its brightness up close, + and - double and halve the lights, F shows the tiles without
-//! their filter, P goes on to the next part of the light: all, what lamps send directly, or what virtual lights bring. Otherwise as the viewer.
+//! their filter, H blends the light of virtual lights with that of the frame before or no longer, P goes on to the next part of the light: all, what lamps send directly, or what virtual lights bring. Otherwise as the viewer.
 //!
 //! Source of the program's form: S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR 2007.
 
@@ -34,6 +34,8 @@ const LIGHTS: u32 = 256;
 const LIGHTS_MAX: u32 = 1 << 14;
 const PLACED_MAX: u32 = 1 << 12;
 const LIGHTS_MIN: u32 = 16;
+/// The greatest share of the frame before that key H goes to.
+const HISTORY: f32 = 0.9;
 /// Degrees that the lamp goes around each frame, unless told otherwise.
 const TURN: f64 = 3.0;
 const VISIBILITIES: [Visibility; 3] = [Visibility::Rays, Visibility::Maps, Visibility::None];
@@ -56,6 +58,7 @@ fn run() -> Result<()> {
         "--visibility",
         "--bound",
         "--interleave",
+        "--history",
         "--turn",
     ];
     let given = Arguments::of_process(&[&own[..], &window::Options::NAMES].concat(), 1)?;
@@ -66,6 +69,7 @@ fn run() -> Result<()> {
         "visibility": given.text("--visibility").unwrap_or("rays"),
         "bound": given.text("--bound").unwrap_or("geometry"),
         "interleave": given.value("--interleave")?.unwrap_or(standard.interleave),
+        "history": given.value("--history")?.unwrap_or(standard.history),
     }))?;
     let turn: f64 = given.value("--turn")?.unwrap_or(TURN);
     window::show(window::Options::of(&given, SCENE)?, |canvas| {
@@ -156,8 +160,9 @@ impl ManyLights {
             self.scene
                 .move_light(&self.gpu, self.lamp.light(), &self.lamp.at(self.angle))?;
         }
-        let keeps_lights = self.settings.placement == Placement::Incremental;
-        if view.pose != orbit.pose() || (lamp_moves && keeps_lights) {
+        // What is kept from frame to frame, lights or their light.
+        let keeps = self.settings.placement == Placement::Incremental || self.settings.history > 0.0;
+        if view.pose != orbit.pose() || (lamp_moves && keeps) {
             view.renderer.set_camera(&orbit.camera())?;
             (view.pose, view.samples) = (orbit.pose(), 0);
         } else if lamp_moves {
@@ -201,12 +206,13 @@ impl Show for ManyLights {
         let (seconds, frames) = std::mem::take(&mut self.untold);
         let s = &self.settings;
         format!(
-            "{}: {} lights, visibility {:?}, bound {:?}, filter {}, {:.1} frames/s",
+            "{}: {} lights, visibility {:?}, bound {:?}, filter {}, history {}, {:.1} frames/s",
             PARTS[self.part].0,
             s.lights,
             s.visibility,
             s.bound,
             if s.filter { "on" } else { "off" },
+            if s.history > 0.0 { "on" } else { "off" },
             f64::from(frames) / seconds,
         )
     }
@@ -230,6 +236,7 @@ impl Show for ManyLights {
                 }
                 "-" => s.lights = (s.lights / 2).max(LIGHTS_MIN),
                 "f" => s.filter = !s.filter,
+                "h" => s.history = if s.history > 0.0 { 0.0 } else { HISTORY },
                 "p" => self.next_part(),
                 _ => return,
             },

@@ -14,6 +14,7 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
+#include "techniques/instant_radiosity/light_color.glsl"
 #include "techniques/instant_radiosity/split_place.glsl"
 
 layout(constant_id = 145) const bool FILTERS = true;
@@ -46,9 +47,6 @@ vec3 merged(uint place) {
     uvec2 of_subset = interleave_lights(tile % push.subsets, push.subsets, push.lights);
     return split_states[place].sum * (push.scale * (float(push.lights) / float(of_subset.y - of_subset.x)));
 }
-
-// By what light is divided before it is averaged: a surface's colour, and nothing where it has none.
-vec3 divisor(vec3 color) { return mix(vec3(1.0), color, greaterThan(color, vec3(0.0))); }
 
 // 1 for bands in which both colours are something, or both nothing: what one shows of the light there tells of the other.
 vec3 alike(vec3 a, vec3 b) { return vec3(equal(greaterThan(a, vec3(0.0)), greaterThan(b, vec3(0.0)))); }

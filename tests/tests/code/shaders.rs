@@ -45,6 +45,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("host_frame.comp", "ArrayStride"),
     // A reference that naga does not follow.
     ("cube_probe.comp", "InvalidId"),
+    ("techniques/instant_radiosity/deferred_history.comp", "InvalidId"),
     ("techniques/instant_radiosity/deferred_merge.comp", "InvalidId"),
     ("techniques/instant_radiosity/deferred_split.comp", "InvalidId"),
     // A local variable of a type that naga lets none have.

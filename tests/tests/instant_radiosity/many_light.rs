@@ -1,6 +1,7 @@
 //! Deferred frames of many lights against the path tracer, against themselves without tiles, and by exact counts.
 
 mod discs;
+mod history;
 mod kept;
 mod metropolis;
 mod reflective;
@@ -493,6 +494,7 @@ fn prints_its_hash_when_asked() {
             ..exact()
         };
         all.extend(bits(&picture(gpu, &hall(), [13, 7], &settings, 1)));
+        all.extend(history::bits_of_frames(gpu));
         print_hash(all);
     });
 }

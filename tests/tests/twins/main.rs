@@ -7,6 +7,7 @@ mod directions;
 mod edges;
 mod fresnel_forms;
 mod geometry;
+mod history;
 mod impostors;
 mod interleave;
 mod light_tree;

@@ -4,7 +4,7 @@ use super::*;
 use clerestory::techniques::instant_radiosity::resampling::resample;
 use clerestory_tests::with_gpu;
 
-const RESAMPLE: u32 = 17;
+const RESAMPLE: u32 = 18;
 
 #[test]
 fn resampled_candidates_agree_with_their_twins() {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::*;
 use clerestory::transport::GpuScene;
 
-fn kept() -> ManyLightSettings {
+pub(super) fn kept() -> ManyLightSettings {
     ManyLightSettings {
         placement: Placement::Incremental,
         renewed: 4,
@@ -13,14 +13,14 @@ fn kept() -> ManyLightSettings {
     }
 }
 
-fn point(position: Vec3) -> LightKind {
+pub(super) fn point(position: Vec3) -> LightKind {
     LightKind::Point {
         position,
         intensity: Vec3::splat((20.0 * 0.25 / PI) as f32),
     }
 }
 
-fn spot(position: Vec3, direction: Vec3) -> LightKind {
+pub(super) fn spot(position: Vec3, direction: Vec3) -> LightKind {
     LightKind::Spot {
         position,
         direction,
@@ -31,7 +31,7 @@ fn spot(position: Vec3, direction: Vec3) -> LightKind {
 }
 
 /// A scene with these lights alone.
-fn lit_by(mut scene: Scene, lights: &[LightKind]) -> Scene {
+pub(super) fn lit_by(mut scene: Scene, lights: &[LightKind]) -> Scene {
     scene.lights.clear();
     for kind in lights {
         scene.add_light("lamp", *kind);
@@ -44,15 +44,16 @@ fn closed_box() -> Scene {
 }
 
 /// A rendering whose lamps move.
-struct Moving<'a> {
+pub(super) struct Moving<'a> {
     gpu: &'a Gpu,
-    scene: Scene,
+    /// Its first camera is looked through in the next frame.
+    pub scene: Scene,
     on_device: Arc<GpuScene>,
-    renderer: ManyLight,
+    pub renderer: ManyLight,
 }
 
 impl<'a> Moving<'a> {
-    fn new(gpu: &'a Gpu, scene: Scene, size: [u32; 2], settings: ManyLightSettings) -> Self {
+    pub fn new(gpu: &'a Gpu, scene: Scene, size: [u32; 2], settings: ManyLightSettings) -> Self {
         let on_device = upload(gpu, &scene);
         let renderer = ManyLight::new(gpu, Arc::clone(&on_device), &scene.cameras[0], size, settings);
         let renderer = renderer.unwrap_or_else(|error| panic!("{}: {error}", scene.name));
@@ -65,7 +66,7 @@ impl<'a> Moving<'a> {
     }
 
     /// A frame with the first lamp there: its radiance, and by how much renewed lights, rays to lights and maps have become more.
-    fn frame(&mut self, lamp: LightKind) -> (Vec<f32>, [u64; 3]) {
+    pub fn frame(&mut self, lamp: LightKind) -> (Vec<f32>, [u64; 3]) {
         let counts = |renderer: &ManyLight| {
             let counts = renderer.counts();
             [counts.renewed, counts.sight_rays, counts.maps]
@@ -220,13 +221,13 @@ fn kept_lights_have_all_of_the_power() {
     });
 }
 
-/// Every picture is of another seed, and so independent of the others.
-fn seeds(gpu: &Gpu, scene: &Scene, settings: &ManyLightSettings, count: u32) -> Passes {
+/// Every picture, of so many frames, is of another seed, and so independent of the others.
+pub(super) fn seeds(gpu: &Gpu, scene: &Scene, settings: &ManyLightSettings, each: u32, count: u32) -> Passes {
     let mut renderer = frames(gpu, scene, SIZE, settings);
     let pictures: Vec<Vec<f32>> = (0..count)
         .map(|seed| {
             renderer.restart(100 + seed).expect("another seed");
-            let [radiance, _] = advance(&mut renderer, 1);
+            let [radiance, _] = advance(&mut renderer, each);
             radiance
         })
         .collect();
@@ -263,7 +264,7 @@ fn means_over_seeds_are_the_path_tracers() {
                 interleave,
                 ..of(INDIRECT, kept())
             };
-            let found = seeds(gpu, scene, &settings, 64);
+            let found = seeds(gpu, scene, &settings, 1, 64);
             found.expect_same_as(&format!("{interleave} tiles a side"), &reference, bias);
         }
     });

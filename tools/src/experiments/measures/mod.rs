@@ -184,6 +184,7 @@ measures! {
     on_host "triangle-tests" rays::triangle_tests;
     on_host "virtual-images" impostors::virtual_images;
     on_device "volume-bandwidths" photons::volume_bandwidths;
+    on_device "vpl-history" virtual_lights::vpl_history;
     on_device "vpl-incremental" virtual_lights::vpl_incremental;
     on_host "vpl-order" virtual_lights::vpl_order;
     on_device "vpl-potential" virtual_lights::vpl_potential;

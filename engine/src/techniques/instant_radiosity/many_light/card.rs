@@ -25,7 +25,7 @@ const BIAS: Bias = Bias::Biased(
     "what the bound of the geometry term leaves out is not compensated; the filter averages the light of neighbouring pixels on a surface; \
      visibility by maps errs at borders of shadows by their texels, by imperfect ones also by what their points miss or hang over, and without any light goes through \
      everything; by reflective shadow maps a texel's middle stands for all of the texel; lights that are kept stand for all directions in every frame; \
-     silhouettes are the rasterizer's, off by parts of a pixel",
+     with a history light lags behind what changes; silhouettes are the rasterizer's, off by parts of a pixel",
 );
 
 const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT"];
@@ -191,6 +191,11 @@ impl Technique for ManyLight {
                 "virtual lights are kept from frame to frame",
             ),
             (
+                lights && !settings.has_history(),
+                "history of indirect light",
+                "it was not asked for",
+            ),
+            (
                 lights && !self.has_reservoirs() && !settings.filters(),
                 "filter of neighbouring pixels",
                 "it was not asked for, or all pixels have all lights",
@@ -295,7 +300,10 @@ const ROWS: &[Row] = &[
         role: Role::PartOf("SVO-P12"),
         limits: "Blurs contact shadows, and highlights of glossy surfaces, by half as many pixels as there are tiles along a side, and surfaces of one height that lie apart but are neighbours in the picture; single pixels without neighbours keep their pattern.",
         sources: &[sources::LAINE_2007.whole(), sources::SUN_2015.at("§4.12")],
-        shaders: &["shaders/techniques/instant_radiosity/deferred_merge.comp"],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/deferred_merge.comp",
+            "shaders/techniques/instant_radiosity/light_color.glsl",
+        ],
         bias: Some(Bias::Biased(
             "the light of neighbouring pixels on a surface is averaged",
         )),
@@ -453,6 +461,47 @@ const ROWS: &[Row] = &[
         ],
         settings: &["placement", "pool", "tries", "mutations", "power_pixels"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/metropolis.rs")
+    },
+    Row {
+        id: "SVO-G4",
+        name: "temporal coherence: indirect light blended with that of the frame before where the camera before saw the same surface, by a confidence that changes of position, normal and light lower",
+        role: Role::PartOf("SVO-P12"),
+        limits: "Objects stand still, lamps and the camera move; light lags behind what changes and smears along surfaces that pixels move over; frames on a film are no independent samples; a frame without virtual lights ends the history.",
+        sources: &[sources::SUN_2015.at("§2.2.4")],
+        shaders: &[
+            "shaders/techniques/instant_radiosity/deferred_history.comp",
+            "shaders/techniques/instant_radiosity/history.glsl",
+            "shaders/techniques/instant_radiosity/light_color.glsl",
+        ],
+        bias: Some(Bias::Biased(
+            "light lags behind what changes, is resampled where pixels move, and is bounded by what is around before it enters",
+        )),
+        tests: &[
+            "engine/src/techniques/instant_radiosity/many_light/history.rs::points_on_a_pixels_ray_are_in_its_middle",
+            "engine/src/techniques/instant_radiosity/many_light/history.rs::weights_sum_to_one_and_middles_have_one_pixel",
+            "engine/src/techniques/instant_radiosity/many_light/history.rs::confidence_falls_with_the_largest_change",
+            "engine/src/techniques/instant_radiosity/many_light/history.rs::changes_are_relative_and_bounds_scale",
+            "tests/tests/twins/history.rs::histories_agree_with_their_twins",
+            "tests/tests/instant_radiosity/many_light/history.rs::noise_falls_as_the_closed_form_says",
+            "tests/tests/instant_radiosity/many_light/history.rs::means_over_seeds_are_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/history.rs::steps_of_light_arrive_as_powers_of_the_confidence",
+            "tests/tests/instant_radiosity/many_light/history.rs::what_was_hidden_has_no_confidence",
+            "tests/tests/instant_radiosity/many_light/history.rs::ghosts_stay_near_what_was_hidden",
+            "tests/tests/instant_radiosity/many_light/history.rs::changes_of_light_lower_the_confidence",
+            "tests/tests/instant_radiosity/many_light/history.rs::single_bright_pixels_are_bounded",
+            "tests/tests/instant_radiosity/many_light/history.rs::histories_cost_what_they_keep_and_nothing_where_there_are_none",
+            "tests/tests/instant_radiosity/many_light/history.rs::histories_do_not_depend_on_how_work_is_shared_out",
+            "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",
+        ],
+        api: &["clerestory::techniques::instant_radiosity::many_light::history"],
+        settings: &[
+            "history",
+            "history_position",
+            "history_normal",
+            "history_light",
+            "history_bound",
+        ],
+        ..Row::of("engine/src/techniques/instant_radiosity/many_light/past.rs")
     },
     Row {
         id: "SVO-B0",

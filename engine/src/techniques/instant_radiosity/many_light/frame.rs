@@ -7,6 +7,7 @@ use glam::DVec2;
 use super::kernels::{Sight, seen_from};
 use super::maps::Maps;
 use super::metropolis::{Chains, Metropolis};
+use super::past::Past;
 use super::reflective::{LightView, Reflective};
 use super::renderer::{Indirect, LightSource, ManyLight};
 use crate::gpu::shaders::types::SeenFrom;
@@ -75,6 +76,8 @@ enum Stage {
     Reuse(u32),
     /// Back to the picture, from that pixel on.
     Merge(u32),
+    /// Blended with the frame before, from that pixel on.
+    Blend(u32),
     Ended,
 }
 
@@ -116,11 +119,11 @@ impl ManyLight {
             Some(Indirect {
                 source: LightSource::Walks(tracer),
                 ..
-            }) => Stage::Walks(Box::new(tracer.begin(self.done, None))),
+            }) => Stage::Walks(Box::new(tracer.begin(self.number(), None))),
             Some(Indirect {
                 source: LightSource::Metropolis(chains),
                 ..
-            }) => Stage::Walks(Box::new(chains.tracer.begin(self.done, None))),
+            }) => Stage::Walks(Box::new(chains.tracer.begin(self.number(), None))),
             Some(Indirect {
                 source: LightSource::Kept(_),
                 ..
@@ -167,6 +170,7 @@ impl ManyLight {
             Stage::Resample(pixel) => self.resample(frame, pixel)?,
             Stage::Reuse(pixel) => self.reuse(frame, pixel)?,
             Stage::Merge(pixel) => self.merge(frame, pixel)?,
+            Stage::Blend(pixel) => self.blend(frame, pixel)?,
             Stage::Ended => (Vec::new(), Stage::Ended),
         };
         frame.stage = next;
@@ -195,7 +199,7 @@ impl ManyLight {
         let traced = tracing.into_traced();
         self.counts.walks += traced.counts;
         if self.metropolis().is_some() && traced.records > 0 {
-            frame.chains = Some(Box::new(Chains::new(self.done, self.film.size(), traced.records)));
+            frame.chains = Some(Box::new(Chains::new(self.number(), self.film.size(), traced.records)));
             return Ok((timings, self.first_drawing()));
         }
         Ok((timings, self.placed(frame, traced.records)?))
@@ -290,7 +294,7 @@ impl ManyLight {
 
     /// What the maps of a frame are drawn from, and the views of that.
     fn emit(&mut self) -> Result<(Vec<Timings>, Stage)> {
-        let number = self.done;
+        let number = self.number();
         let timings = self.submit(|own, recorder| match own.reflective() {
             Some(reflective) => reflective.record_emitters(recorder, &own.scene, number),
             None => Ok(()),
@@ -340,7 +344,7 @@ impl ManyLight {
         if views == 0 {
             return Ok((Vec::new(), self.placed(frame, 0)?));
         }
-        let number = self.done;
+        let number = self.number();
         let timings = self.submit(|own, recorder| match own.reflective() {
             Some(reflective) => reflective.record_lights(recorder, &own.scene, views, number),
             None => Ok(()),
@@ -677,11 +681,17 @@ impl ManyLight {
         let at_once = self.indirect.as_ref().filter(|_| gathered).and_then(Indirect::split);
         let at_once = at_once.map_or(all, |split| split.pixels);
         let end = first.saturating_add(at_once).min(all);
+        let blends = gathered && self.past().is_some();
         let timings = self.submit(|own, recorder| {
             let split = own.indirect.as_ref().filter(|_| gathered).and_then(Indirect::split);
             if let (Some(split), Some(seen)) = (split, &own.seen) {
+                let target = own.past().map_or(&own.radiance, Past::light);
                 recorder.pass("many-light: merge", |pass| {
-                    split.record_merge(pass, seen, frame.lights, first..end, &own.radiance)
+                    split.record_merge(pass, seen, frame.lights, first..end, target)?;
+                    if blends {
+                        pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
+                    }
+                    Ok(())
                 })?;
             } else if own.direct.is_none() && frame.views == 0 && !gathered {
                 recorder.pass("many-light: black", |pass| {
@@ -690,12 +700,53 @@ impl ManyLight {
                     Ok(())
                 })?;
             }
+            if end < all || blends {
+                return Ok(());
+            }
+            own.film.record_frame(recorder, &own.radiance)
+        })?;
+        let next = match (end < all, blends) {
+            (true, _) => Stage::Merge(end),
+            (false, true) => Stage::Blend(0),
+            (false, false) => {
+                // Light that is gone is gone at once.
+                let past = self.indirect.iter_mut().filter_map(|indirect| indirect.past.as_mut());
+                past.for_each(Past::forget);
+                Stage::Ended
+            }
+        };
+        Ok((timings, next))
+    }
+
+    /// Indirect light of a part of the pixels with that of the frame before, to the picture.
+    fn blend(&mut self, frame: &Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
+        let all = self.pixels();
+        let at_once = self.past().map_or(all, |past| past.pixels);
+        let end = first.saturating_add(at_once).min(all);
+        let timings = self.submit(|own, recorder| {
+            let (Some(indirect), Some(seen)) = (&own.indirect, &own.seen) else {
+                return Ok(());
+            };
+            let (Some(past), Some(split)) = (&indirect.past, indirect.split()) else {
+                return Ok(());
+            };
+            recorder.pass("many-light: blend", |pass| {
+                let colors = split.colors();
+                past.record(pass, seen, frame.from, colors, first..end, &own.radiance)?;
+                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
+                Ok(())
+            })?;
             if end < all {
                 return Ok(());
             }
             own.film.record_frame(recorder, &own.radiance)
         })?;
-        let next = if end < all { Stage::Merge(end) } else { Stage::Ended };
-        Ok((timings, next))
+        if end < all {
+            return Ok((timings, Stage::Blend(end)));
+        }
+        if let Some(past) = self.indirect.as_mut().and_then(|indirect| indirect.past.as_mut()) {
+            past.keep(frame.from);
+        }
+        Ok((timings, Stage::Ended))
     }
 }

@@ -42,11 +42,20 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// For pictures of `size` pixels, with what tells neighbours on the same surface if those are asked for.
-    pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, size: [u32; 2], has_neighbours: bool) -> Result<Self> {
+    /// For pictures of `size` pixels, with what tells neighbours on the same surface if those are asked for, and what a history reads if there is one.
+    pub fn new(
+        gpu: &Gpu,
+        surfaces: &Surfaces<'_>,
+        size: [u32; 2],
+        has_neighbours: bool,
+        has_history: bool,
+    ) -> Result<Self> {
         let mut outputs = vec![Output::Triangle, Output::Weights];
-        if has_neighbours {
+        if has_neighbours || has_history {
             outputs.extend([Output::Position, Output::Normals]);
+        }
+        if has_history {
+            outputs.push(Output::Object);
         }
         let desc = GBufferDesc {
             size,
@@ -89,6 +98,18 @@ impl Seen {
 
     pub fn weights(&self) -> Result<SampledView<'_>> {
         self.view(Output::Weights, Output::Weights)
+    }
+
+    pub fn positions(&self) -> Result<SampledView<'_>> {
+        self.view(Output::Position, Output::Weights)
+    }
+
+    pub fn normals(&self) -> Result<SampledView<'_>> {
+        self.view(Output::Normals, Output::Triangle)
+    }
+
+    pub fn objects(&self) -> Result<SampledView<'_>> {
+        self.view(Output::Object, Output::Object)
     }
 }
 
@@ -265,7 +286,7 @@ impl Split {
             edge_bound: bound.kind(),
             lights_at_once,
             visibility: settings.visibility.kind(),
-            keeps_colors: settings.filters(),
+            keeps_colors: settings.keeps_colors(),
             shadow_kind: if has_maps { LAYOUT.kind() } else { 0 },
             shadow_width: 0,
             index_quota,
@@ -277,6 +298,7 @@ impl Split {
             gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work))
         };
         let (filters, counters) = (settings.filters(), size_of::<Counters>());
+        let colors = if settings.keeps_colors() { places } else { 1 };
         let [lower, upper] = scene.bounds();
         let connections = connections_at_once(gpu);
         let at_once = (connections / lights_at_once).max(1);
@@ -305,7 +327,7 @@ impl Split {
             scale: 1.0 / settings.lights as f32,
             places: buffer("split places", size_of::<SplitPlace>(), places)?,
             states: buffer("split states", size_of::<GatherState>(), places)?,
-            colors: buffer("split colors", size_of::<[f32; 3]>(), if filters { places } else { 1 })?,
+            colors: buffer("split colors", size_of::<[f32; 3]>(), colors)?,
             counters: buffer("deferred counters", counters, 1)?,
             counters_readback: gpu.buffer(&BufferDesc::readback("deferred counters", counters as u64))?,
             no_maps: gpu.buffer_with("no shadows", Category::Light, &[f32::INFINITY])?,
@@ -440,10 +462,15 @@ impl Split {
         let set = deferred_merge::Set0 {
             split_states: self.states.view(),
             split_colors: self.colors.view(),
-            seen_positions: seen.view(Output::Position, Output::Weights)?,
-            seen_normals: seen.view(Output::Normals, Output::Triangle)?,
+            seen_positions: seen.positions()?,
+            seen_normals: seen.normals()?,
             radiance: radiance.view(),
         };
         pass.dispatch(&self.merge, &[&set], &push, groups)
+    }
+
+    /// Of surfaces, by place, where settings keep them.
+    pub fn colors(&self) -> &Buffer {
+        &self.colors
     }
 }

@@ -9,7 +9,8 @@
 //! A frame is a sample of every pixel: walks from the lights, or points on reflective shadow maps of them, leave a virtual light each where they first land, or those of points and spots are
 //! kept from frame to frame ([`incremental`](crate::techniques::instant_radiosity::incremental)); a G-buffer is rasterized; a kernel adds what is emitted and
 //! what arrives directly, with two rays a pixel; the G-buffer is split into n × n tiles ([`Interleaving`]), each place gathers from its tile's subset of the virtual
-//! lights, and sums go back to their pixels, where a filter averages those of neighbours on the same surface.
+//! lights, and sums go back to their pixels, where a filter averages those of neighbours on the same surface; a [`history`] blends them with those of the frame before, for
+//! frames that are shown one by one. On a film frames with a history are no independent samples: their mean is the same where nothing moves, but its variance is more than it says.
 //!
 //! # Bias
 //!
@@ -27,6 +28,9 @@
 //! - *Discs.* What is gathered from texels in discs comes through everything, and what lies beyond a disc or the view that it is in is missing; the published weight is off
 //!   by what the light falls or grows over a disc.
 //! - *Reservoirs.* None of their own: what neighbours keep is weighted by the chance that each pixel had to keep it.
+//! - *History.* Light that is blended with that of the frame before lags behind what changes: of a step 1 - cᵏ are there after k frames where the confidence stays c. Noise lowers the
+//!   confidence, too, by bright frames and dark ones alike, and what is bounded for a history is missing. Where pixels move over surfaces light is blurred along these by parts of a pixel a frame.
+//!   Objects stand still for it: of one that was moved ([`GpuScene::move_object`](crate::transport::GpuScene::move_object)) light is looked up where its points are now.
 //! - *Edges.* Rasterizers round corners to parts of a pixel (1/256 here): what is seen at a silhouette may be what lies behind, as far beside it, even where that is inside
 //!   of a closed body.
 //!
@@ -35,19 +39,21 @@
 //! Without bound and filter and with rays a frame's expected picture is that of its light paths, except that numbers of lights which a tile has follow those which
 //! have landed: an error of the order of one over the walks.
 //!
-//! Guarantees: deterministic in (seed, frame), and where lights are kept in where their lamps have been, on any number of threads; a submission is a bounded piece of work; pairs of pixels and lights are nowhere stored; what
+//! Guarantees: deterministic in (seed, frame), where lights are kept in where their lamps have been, and with a history in all frames since it began, on any number of threads; a submission is a bounded piece of work; pairs of pixels and lights are nowhere stored; what
 //! settings or scene do not ask for costs no pass and no buffer.
 
 mod card;
 mod discs;
 mod exact_maps;
 mod frame;
+pub mod history;
 mod imperfect_maps;
 mod interleave;
 mod kept;
 mod kernels;
 mod maps;
 mod metropolis;
+mod past;
 mod records;
 mod reflective;
 mod renderer;

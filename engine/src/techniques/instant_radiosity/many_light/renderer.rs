@@ -11,6 +11,7 @@ use super::kept::KeptLights;
 use super::kernels::{Direct, Seen, Split};
 use super::maps::Maps;
 use super::metropolis::Metropolis;
+use super::past::Past;
 use super::records::LightRecord;
 use super::reflective::Reflective;
 use super::reservoirs::Reservoirs;
@@ -82,6 +83,8 @@ pub struct ManyLight {
     pub(super) frame: Option<Frame>,
     /// Frames on the film.
     pub(super) done: u32,
+    /// Frames before them whose light lasts, so that no two have the same virtual lights.
+    pub(super) before: u32,
     /// Virtual lights that a frame has placed last.
     pub(super) placed: u32,
     pub(super) counts: ManyLightCounts,
@@ -149,6 +152,8 @@ pub(super) struct Indirect {
     pub(super) source: LightSource,
     pub(super) gatherer: Gatherer,
     pub(super) maps: Option<Maps>,
+    /// The frame before, where light is blended with it.
+    pub(super) past: Option<Past>,
 }
 
 /// How pixels take their light.
@@ -196,8 +201,9 @@ impl ManyLight {
         let discs = (shows_indirect && has_discs).then(|| Discs::new(gpu, &scene, &settings, pixels));
         let (direct, indirect, discs) = (direct.transpose()?, indirect.transpose()?, discs.transpose()?);
         let has_neighbours = indirect.is_some() && settings.has_neighbours();
+        let has_history = indirect.as_ref().is_some_and(|indirect| indirect.past.is_some());
         let is_seen = shows_direct || shows_indirect;
-        let seen = is_seen.then(|| Seen::new(gpu, &surfaces, size, has_neighbours));
+        let seen = is_seen.then(|| Seen::new(gpu, &surfaces, size, has_neighbours, has_history));
         let seen = seen.transpose()?;
         let bytes = FrameTarget::bytes(size);
         Ok(Self {
@@ -213,6 +219,7 @@ impl ManyLight {
             radiance: gpu.buffer(&BufferDesc::storage("frame", bytes, Category::Film))?,
             frame: None,
             done: 0,
+            before: 0,
             placed: 0,
             counts: ManyLightCounts::default(),
             scene,
@@ -268,7 +275,7 @@ impl ManyLight {
         self.direct.is_some()
     }
 
-    /// Bytes of what lies between passes: G-buffer, split picture or reservoirs, shadow maps, views of lights; not the records of virtual lights, 64 bytes each.
+    /// Bytes of what lies between passes: G-buffer, split picture or reservoirs, shadow maps, views of lights, and what frames leave for the next ones; not the records of virtual lights, 64 bytes each.
     pub fn bytes(&self) -> u64 {
         let seen = self.seen.as_ref().map_or(0, |seen| seen.gbuffer.bytes());
         let gathered = self.indirect.as_ref().map_or(0, |indirect| match &indirect.gatherer {
@@ -278,7 +285,8 @@ impl ManyLight {
         let maps = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
         let source = self.indirect.as_ref().map_or(0, |indirect| indirect.source.bytes());
         let source = source + self.discs.as_ref().map_or(0, |discs| discs.reflective.bytes());
-        seen + gathered + source + maps.map_or(0, Maps::bytes)
+        let past = self.past().map_or(0, Past::bytes);
+        seen + gathered + source + maps.map_or(0, Maps::bytes) + past
     }
 
     /// The virtual lights that a frame has placed last, those of all together that have power; none before the first ones.
@@ -297,6 +305,15 @@ impl ManyLight {
             .collect())
     }
 
+    /// By pixel, the share of the last frame's indirect light that was that of the frame before, of [`ManyLightSettings::history`] at most; 0 where nothing is seen, or nothing was
+    /// before. None where no history is kept, or no frame with virtual lights has ended since it began.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    pub fn confidence(&self) -> Result<Vec<f32>> {
+        self.past().map_or(Ok(Vec::new()), |past| past.confidence(&self.gpu))
+    }
+
     /// The kernels with their specialization.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = Vec::new();
@@ -309,6 +326,7 @@ impl ManyLight {
                 Gatherer::Reservoirs(reservoirs) => all.extend(reservoirs.pipelines()),
             }
             all.extend(indirect.maps.iter().flat_map(Maps::pipelines));
+            all.extend(indirect.past.iter().map(Past::info));
         }
         all.extend(self.discs.iter().flat_map(Discs::pipelines));
         all.extend(self.film.pipelines());
@@ -316,7 +334,8 @@ impl ManyLight {
     }
 
     /// Looks through another camera, or the same, and begins anew, also where a light has [moved](GpuScene::move_light). Virtual lights that are kept stay
-    /// ([`Placement::Incremental`]), and their shadow maps: where an object has moved, [`restart`](Self::restart) instead.
+    /// ([`Placement::Incremental`]), and their shadow maps: where an object has moved, [`restart`](Self::restart) instead. So does the light of the last frame
+    /// ([`ManyLightSettings::history`]).
     ///
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
@@ -327,11 +346,14 @@ impl ManyLight {
             self.camera = camera.clone();
             self.parts = None;
         }
+        if self.past().is_some() {
+            self.before = self.number();
+        }
         (self.done, self.frame) = (0, None);
         Ok(())
     }
 
-    /// Forgets everything gathered so far, kept virtual lights too, and begins anew with this seed, with the kernels there are.
+    /// Forgets everything gathered so far, kept virtual lights and the last frame's light too, and begins anew with this seed, with the kernels there are.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
@@ -346,11 +368,12 @@ impl ManyLight {
             if let Gatherer::Reservoirs(reservoirs) = &mut indirect.gatherer {
                 reservoirs.set_seed(seed);
             }
+            indirect.past.iter_mut().for_each(Past::forget);
         }
         if let Some(discs) = &mut self.discs {
             discs.set_seed(seed);
         }
-        (self.done, self.frame) = (0, None);
+        (self.done, self.before, self.frame) = (0, 0, None);
         Ok(())
     }
 
@@ -396,6 +419,16 @@ impl ManyLight {
     /// [`Error::Setting`] when the buffer is too small, [`Error::DeviceLost`].
     pub fn display(&mut self, target: &Buffer, exposure: f32, format: PixelFormat) -> Result<()> {
         self.film.display(target, exposure, format)
+    }
+
+    /// Of the next frame, by which its virtual lights are chosen.
+    pub(super) fn number(&self) -> u32 {
+        self.before.wrapping_add(self.done)
+    }
+
+    /// The frame before, where light is blended with it.
+    pub(super) fn past(&self) -> Option<&Past> {
+        self.indirect.as_ref().and_then(|indirect| indirect.past.as_ref())
     }
 
     /// Of the picture.
@@ -449,6 +482,9 @@ impl Indirect {
             Placement::Incremental => LightSource::Kept(Box::new(KeptLights::new(gpu, scene, settings)?)),
         };
         let maps = Maps::new(gpu, &scene.surfaces(), settings)?;
+        let past = Past::new(gpu, scene, settings, size, adds)?;
+        // With a frame before it is that which adds.
+        let adds = adds && past.is_none();
         let gatherer = match settings.gathering {
             Gathering::Reservoirs => {
                 let pixels = size[0] * size[1];
@@ -459,6 +495,11 @@ impl Indirect {
                 Gatherer::Split(Box::new(split))
             }
         };
-        Ok(Self { source, gatherer, maps })
+        Ok(Self {
+            source,
+            gatherer,
+            maps,
+            past,
+        })
     }
 }

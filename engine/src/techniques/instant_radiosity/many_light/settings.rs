@@ -149,6 +149,19 @@ crate::settings! {
         pub filter_plane: f32 = 0.01, in 0.0..=1.0;
         /// Cosine of the angle between normals above which it does.
         pub filter_normal: f32 = 0.9, in -1.0..=1.0;
+        /// Blends the indirect light of a frame with that of the frame before where this showed the same surface: the greatest share of the latter, 0 for no history. Shares of 0.9 to 0.97 suit
+        /// frames that are shown one by one; a picture that is the mean of many gains nothing.
+        ///
+        /// Source: C. Sun, "Many-Light Real-Time Global Illumination using Sparse Voxel Octree", 2015, §2.2.4.
+        pub history: f32 = 0.0, in 0.0..=0.99;
+        /// By how much the share of the frame before falls with the distance of a point from what stands for it there, over the diagonal of the scene.
+        pub history_position: f32 = 10.0, in 0.0..=1e6;
+        /// By how much it falls with one minus the cosine of the angle between normals.
+        pub history_normal: f32 = 4.0, in 0.0..=1e6;
+        /// By how much it falls with the third power of the change of luminance over what it was, in means over as many pixels as a filter has.
+        pub history_light: f32 = 4.0, in 0.0..=1e6;
+        /// Indirect light enters a history up to so many times as bright as its neighbours, or as what was there; 0 bounds nothing.
+        pub history_bound: f32 = 8.0, in 0.0..=1e6;
         /// Bound of the geometry term between a virtual light and what it lights: none, of the term as a whole, or of the squared distance.
         pub bound: Bound = Bound::Geometry;
         /// The bound: the greatest geometry term, 1/m², or the least squared distance, m²; 0 chooses by the surfaces' area and the walks.
@@ -205,6 +218,10 @@ impl ManyLightSettings {
             let cause = format!("are more than the {CHOSEN_MAX} that placement = \"metropolis\" measures");
             return Err(Error::setting("lights", self.lights, cause));
         }
+        if self.has_history() && self.gathering != Gathering::Lights {
+            let cause = "needs the light of virtual lights: gathering = \"lights\"";
+            return Err(Error::setting("history", self.history, cause));
+        }
         if !self.rsm_side.is_power_of_two() {
             return Err(Error::setting("rsm_side", self.rsm_side, "is no power of two"));
         }
@@ -238,6 +255,16 @@ impl ManyLightSettings {
     /// Whether pixels ask which others see the same surface.
     pub(super) fn has_neighbours(&self) -> bool {
         self.filters() || self.gathering == Gathering::Reservoirs && self.neighbours > 0
+    }
+
+    /// Whether light is blended with that of the frame before.
+    pub(super) fn has_history(&self) -> bool {
+        self.history > 0.0
+    }
+
+    /// Whether surfaces' colours are kept, by which light is divided before it is mixed.
+    pub(super) fn keeps_colors(&self) -> bool {
+        self.filters() || self.has_history()
     }
 
     /// The bound, for surfaces of that area, m².

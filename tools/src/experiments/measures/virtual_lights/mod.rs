@@ -1,6 +1,8 @@
-//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, and orders in which points take them; on the device those that are kept from frame to frame.
+//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, and orders in which points take them; on the device those that are kept from frame to frame,
+//! and light that is.
 
 mod unit_box;
+pub mod vpl_history;
 pub mod vpl_incremental;
 pub mod vpl_order;
 pub mod vpl_potential;

@@ -18,7 +18,7 @@ use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
 
 /// Scenes, whether the lamp is a spot, where it begins and how far it goes on in a frame, as shares of the box around each.
-const SCENES: [(&str, bool, Vec3, Vec3); 3] = [
+pub(super) const SCENES: [(&str, bool, Vec3, Vec3); 3] = [
     (
         "builtin:cornell-box",
         false,
@@ -188,17 +188,18 @@ fn pairs(rows: &[Row]) -> Vec<Pair> {
 }
 
 /// A scene that a lamp of so much light alone lights, and the lamp's way.
-struct Subject {
-    scene: Scene,
+pub(super) struct Subject {
+    pub scene: Scene,
     lower: Vec3,
-    size: Vec3,
+    /// Of the box around it, m.
+    pub size: Vec3,
     is_spot: bool,
     start: Vec3,
     step: Vec3,
 }
 
 impl Subject {
-    fn new((address, is_spot, start, step): (&str, bool, Vec3, Vec3)) -> Result<Self> {
+    pub fn new((address, is_spot, start, step): (&str, bool, Vec3, Vec3)) -> Result<Self> {
         let mut scene = scene::load(address)?;
         for material in &mut scene.materials {
             material.emission = Vec3::ZERO;
