@@ -62,15 +62,15 @@ layout(set = 0, binding = 7, scalar) restrict buffer Radiance { vec3 radiance[];
 #include "techniques/instant_radiosity/seen_surface.glsl"
 
 // The pixel, the first, and its neighbours.
-const uint MEMBERS = NEIGHBOURS + 1u;
-uint member_pixels[MEMBERS];
+const uint MEMBERS_MAX = 9u;
+uint member_pixels[MEMBERS_MAX];
 uint members = 1u;
 
 // What they keep: what it brings to its own pixel, to all of them together, and to the first.
-Reservoir kept[MEMBERS];
-float brings_own[MEMBERS];
-float brings_all[MEMBERS];
-float brings_first[MEMBERS];
+Reservoir kept[MEMBERS_MAX];
+float brings_own[MEMBERS_MAX];
+float brings_all[MEMBERS_MAX];
+float brings_first[MEMBERS_MAX];
 
 uvec2 pixel_of(uint i) { return uvec2(i % push.seen.width, i / push.seen.width); }
 
