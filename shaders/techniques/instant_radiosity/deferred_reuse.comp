@@ -62,15 +62,14 @@ layout(set = 0, binding = 7, scalar) restrict buffer Radiance { vec3 radiance[];
 #include "techniques/instant_radiosity/seen_surface.glsl"
 
 // The pixel, the first, and its neighbours.
-const uint MEMBERS_MAX = 9u;
-uint member_pixels[MEMBERS_MAX];
+uint member_pixels[RESERVOIR_MEMBERS_MAX];
 uint members = 1u;
 
 // What they keep: what it brings to its own pixel, to all of them together, and to the first.
-Reservoir kept[MEMBERS_MAX];
-float brings_own[MEMBERS_MAX];
-float brings_all[MEMBERS_MAX];
-float brings_first[MEMBERS_MAX];
+Reservoir kept[RESERVOIR_MEMBERS_MAX];
+float brings_own[RESERVOIR_MEMBERS_MAX];
+float brings_all[RESERVOIR_MEMBERS_MAX];
+float brings_first[RESERVOIR_MEMBERS_MAX];
 
 uvec2 pixel_of(uint i) { return uvec2(i % push.seen.width, i / push.seen.width); }
 

@@ -9,6 +9,8 @@ struct Reservoir {
     float weight;  // of it, so that on average over draws it stands for all lights; 0 where none brings anything
 };
 
+// A pixel and its neighbours, at most.
+const uint RESERVOIR_MEMBERS_MAX = 9u;
 // Tells the numbers that neighbours are found by from those of candidates.
 const uint RESERVOIR_NEIGHBOURS = 0x6e656967u;
 

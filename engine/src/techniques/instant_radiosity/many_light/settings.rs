@@ -1,6 +1,6 @@
 //! Settings of frames of many lights.
 
-use crate::gpu::shaders::constants::{MEMBERS_MAX, VISIBILITY_MAPS, VISIBILITY_NONE, VISIBILITY_RAYS};
+use crate::gpu::shaders::constants::{RESERVOIR_MEMBERS_MAX, VISIBILITY_MAPS, VISIBILITY_NONE, VISIBILITY_RAYS};
 use crate::techniques::instant_radiosity::incremental::DIRECTIONS_MAX;
 use crate::techniques::instant_radiosity::settings::Bound;
 use crate::transport::PathSet;
@@ -130,7 +130,7 @@ crate::settings! {
         /// Of reservoirs: lights that are drawn for each pixel, from as many even parts of all.
         pub candidates: u32 = 16, in 1..=RESERVOIR_CANDIDATES_MAX, unit "lights";
         /// Of reservoirs: neighbouring pixels that are asked for what they keep, of which those on the same surface count, as `filter_plane` and `filter_normal` say.
-        pub neighbours: u32 = 3, in 0..=MEMBERS_MAX - 1, unit "pixels";
+        pub neighbours: u32 = 3, in 0..=RESERVOIR_MEMBERS_MAX - 1, unit "pixels";
         /// Of reservoirs: how far neighbours are away along each axis, at most.
         pub neighbour_reach: f32 = 8.0, in 1.0..=64.0, unit "pixels";
         /// What tells whether a point sees a virtual light: a shadow ray, a shadow map of each light, an imperfect one of points of the surfaces, or nothing.
