@@ -90,8 +90,9 @@ fn fits(caps: &Caps, size: [u32; 2]) -> Result<()> {
 
 /// Frames are independent, and pixels of a tile have the lights of one; lights that are kept bring the same error in all of them.
 fn law(settings: &Settings) -> Result<Law> {
-    let settings: ManyLightSettings = settings.read()?;
-    let stays = settings.placement == Placement::Incremental;
+    // What is wrong with settings is said where they are used.
+    let read = settings.read::<ManyLightSettings>();
+    let stays = read.is_ok_and(|settings| settings.placement == Placement::Incremental);
     Ok(Law {
         slope: if stays { 0.0 } else { Law::INDEPENDENT.slope },
         shares_noise: true,
