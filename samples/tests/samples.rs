@@ -392,7 +392,7 @@ fn the_keys_of_many_lights_change_its_frames() {
     let light = |picture: &image::RgbImage| mean(picture, [0.0, 1.0], [0.0, 1.0])[0];
     let (all, text) = shown("");
     for expected in [
-        "64 walks",
+        "64 lights",
         "visibility Rays",
         "bound Geometry",
         "filter on",
@@ -421,7 +421,7 @@ fn the_keys_of_many_lights_change_its_frames() {
     );
     let (_, text) = shown("vvppb+fh");
     for expected in [
-        "128 walks",
+        "128 lights",
         "visibility None",
         "bound Distance",
         "filter off",
@@ -430,7 +430,7 @@ fn the_keys_of_many_lights_change_its_frames() {
     ] {
         assert!(text.contains(expected), "no {expected:?} in {text}");
     }
-    assert!(shown("-").1.contains("32 walks"));
+    assert!(shown("-").1.contains("32 lights"));
 }
 
 /// The last frame of the photon viewer, and what it said.

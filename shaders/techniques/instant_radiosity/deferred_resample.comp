@@ -32,8 +32,6 @@ layout(push_constant, scalar) uniform Push {
 
 layout(set = 0, binding = 0) uniform utextureBuffer virtual_light_texels;
 
-#include "techniques/instant_radiosity/seen_receiver.glsl"
-
 layout(set = 0, binding = 1) uniform usampler2D seen_triangles;
 layout(set = 0, binding = 2) uniform sampler2D seen_weights;
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer Reservoirs { Reservoir reservoirs[]; };
@@ -41,6 +39,8 @@ layout(set = 0, binding = 4, scalar) restrict buffer ReservoirCounters {
     uint connections[2];  // 64 bits, low word first: pairs of a pixel and a light
     uint tests[2];        // of visibility
 } reservoir_counters;
+
+#include "techniques/instant_radiosity/seen_pixel.glsl"
 
 // Of the lights one that stands for all.
 Reservoir drawn(Receiver r, uint pixel) {
@@ -71,10 +71,8 @@ void main() {
     if (i >= push.end_pixel) {
         return;
     }
-    uvec2 pixel = uvec2(i % push.seen.width, i / push.seen.width);
-    SplitPlace seen = SplitPlace(texelFetch(seen_triangles, ivec2(pixel), 0).x, texelFetch(seen_weights, ivec2(pixel), 0).xy);
     Receiver r;
-    if (seen.triangle == NO_HIT || !receiver_of_pixel(push.seen, pixel, seen, r)) {
+    if (!receiver_of(i, r)) {
         reservoirs[i] = Reservoir(0u, 0.0);
         return;
     }

@@ -46,8 +46,6 @@ layout(push_constant, scalar) uniform Push {
 
 layout(set = 0, binding = 0) uniform utextureBuffer virtual_light_texels;
 
-#include "techniques/instant_radiosity/seen_receiver.glsl"
-
 layout(set = 0, binding = 1) uniform usampler2D seen_triangles;
 layout(set = 0, binding = 2) uniform sampler2D seen_weights;
 layout(set = 0, binding = 3) uniform sampler2D seen_positions;
@@ -59,7 +57,9 @@ layout(set = 0, binding = 6, scalar) restrict buffer ReservoirCounters {
 } reservoir_counters;
 layout(set = 0, binding = 7, scalar) restrict buffer Radiance { vec3 radiance[]; };
 
+#include "techniques/instant_radiosity/seen_pixel.glsl"
 #include "techniques/instant_radiosity/seen_surface.glsl"
+#include "techniques/instant_radiosity/single_ray.glsl"
 
 // The pixel, the first, and its neighbours.
 uint member_pixels[RESERVOIR_MEMBERS_MAX];
@@ -70,14 +70,6 @@ Reservoir kept[RESERVOIR_MEMBERS_MAX];
 float brings_own[RESERVOIR_MEMBERS_MAX];
 float brings_all[RESERVOIR_MEMBERS_MAX];
 float brings_first[RESERVOIR_MEMBERS_MAX];
-
-uvec2 pixel_of(uint i) { return uvec2(i % push.seen.width, i / push.seen.width); }
-
-bool receiver_of(uint i, out Receiver r) {
-    ivec2 pixel = ivec2(pixel_of(i));
-    SplitPlace seen = SplitPlace(texelFetch(seen_triangles, pixel, 0).x, texelFetch(seen_weights, pixel, 0).xy);
-    return seen.triangle != NO_HIT && receiver_of_pixel(push.seen, uvec2(pixel), seen, r);
-}
 
 void find_neighbours(uint i) {
     ivec2 pixel = ivec2(pixel_of(i));
@@ -123,20 +115,6 @@ bool compare_members(out Receiver r) {
     return gathers;
 }
 
-// Whether a ray arrives, or NaN where its quota stops it.
-float visibility(Ray ray) {
-    if (VISIBILITY == VISIBILITY_NONE) {
-        return 1.0;
-    }
-    if (HAS_ALPHA) {
-        // Cut-outs are there or not, whoever asks.
-        candidate_key = uvec4(0u);
-    }
-    Hit hit = no_hit(ray.t_max);
-    bool stopped = any_hit(ray, INDEX_START, hit) != INDEX_FINISHED;
-    return stopped ? uintBitsToFloat(0x7FC00000u) : hit.triangle != NO_HIT ? 0.0 : 1.0;
-}
-
 void main() {
     uint i = push.first_pixel + invocation_index();
     if (i >= push.end_pixel) {
@@ -165,5 +143,8 @@ void main() {
     Ray ray;
     vec3 found = r.throughput * connection(r, load_virtual_light(kept[taken].light), ray);
     COUNT_WIDE(reservoir_counters.tests, 1u)
-    radiance[i] += found * (push.scale * sum / brings_first[taken] * visibility(ray));
+    bool stopped;
+    float share = single_ray_arrives(ray, stopped) ? 1.0 : 0.0;
+    share = stopped ? uintBitsToFloat(0x7FC00000u) : share;
+    radiance[i] += found * (push.scale * sum / brings_first[taken] * share);
 }

@@ -48,8 +48,6 @@ layout(push_constant, scalar) uniform Push {
 
 layout(set = 0, binding = 0) uniform utextureBuffer virtual_light_texels;
 
-#include "techniques/instant_radiosity/seen_receiver.glsl"
-
 layout(set = 0, binding = 1) uniform usampler2D seen_triangles;
 layout(set = 0, binding = 2) uniform sampler2D seen_weights;
 layout(set = 0, binding = 3, scalar) restrict buffer MetropolisTries { MetropolisTry metropolis_tries[]; };
@@ -63,7 +61,8 @@ layout(set = 0, binding = 7, scalar) restrict buffer MetropolisCounters {
     uint stopped;  // rays that stopped at their quota
 } metropolis_counters;
 
-uvec2 pixel_of(uint i) { return uvec2(i % push.seen.width, i / push.seen.width); }
+#include "techniques/instant_radiosity/seen_pixel.glsl"
+#include "techniques/instant_radiosity/single_ray.glsl"
 
 uint some_light(float u) { return min(uint(u * float(push.pool)), push.pool - 1u); }
 
@@ -111,27 +110,21 @@ MetropolisTry place_of_try(uint i, out uint slot) {
 
 // Luminance that a light brings to what a pixel sees, with a ray.
 float brings(uint i, uint light) {
-    ivec2 pixel = ivec2(pixel_of(i));
-    SplitPlace seen = SplitPlace(texelFetch(seen_triangles, pixel, 0).x, texelFetch(seen_weights, pixel, 0).xy);
     Receiver r;
-    if (seen.triangle == NO_HIT || !receiver_of_pixel(push.seen, uvec2(pixel), seen, r)) {
+    if (!receiver_of(i, r)) {
         return 0.0;
     }
     Ray ray;
     float found = dot(r.throughput * connection(r, load_virtual_light(light), ray), LUMINANCE.rgb);
-    if (VISIBILITY == VISIBILITY_NONE || !(found > 0.0)) {
+    if (!(found > 0.0)) {
         return found;
     }
-    if (HAS_ALPHA) {
-        // Cut-outs are there or not, whoever asks.
-        candidate_key = uvec4(0u);
-    }
-    Hit hit = no_hit(ray.t_max);
-    if (any_hit(ray, INDEX_START, hit) != INDEX_FINISHED) {
+    bool stopped;
+    bool arrives = single_ray_arrives(ray, stopped);
+    if (stopped) {
         atomicAdd(metropolis_counters.stopped, 1u);
-        return 0.0;
     }
-    return hit.triangle != NO_HIT ? 0.0 : found;
+    return arrives && !stopped ? found : 0.0;
 }
 
 void main() {

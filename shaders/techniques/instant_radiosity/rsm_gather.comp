@@ -33,7 +33,6 @@ layout(push_constant, scalar) uniform Push {
 layout(set = 0, binding = 0) uniform utextureBuffer virtual_light_texels;  // none are read
 
 #include "techniques/instant_radiosity/new_virtual_light.glsl"
-#include "techniques/instant_radiosity/seen_receiver.glsl"
 #include "transport/random.glsl"
 
 layout(set = 0, binding = 1) uniform usampler2D seen_triangles;
@@ -42,6 +41,8 @@ layout(set = 0, binding = 3, scalar) restrict readonly buffer RsmEmitters { RsmE
 layout(set = 0, binding = 4, scalar) restrict readonly buffer RsmViews { RsmView rsm_views[]; };
 layout(set = 0, binding = 5, scalar) restrict readonly buffer RsmTexels { RsmTexel rsm_texels[]; };
 layout(set = 0, binding = 6, scalar) restrict buffer Radiance { vec3 radiance[]; };
+
+#include "techniques/instant_radiosity/seen_pixel.glsl"
 
 // Where a view shows a point, in texels; false behind it.
 bool place_in_view(SeenFrom from, vec3 position, out vec2 place) {
@@ -57,10 +58,8 @@ void main() {
     if (index >= push.end_pixel) {
         return;
     }
-    uvec2 pixel = uvec2(index % push.seen.width, index / push.seen.width);
-    SplitPlace seen = SplitPlace(texelFetch(seen_triangles, ivec2(pixel), 0).x, texelFetch(seen_weights, ivec2(pixel), 0).xy);
     Receiver r;
-    if (seen.triangle == NO_HIT || !receiver_of_pixel(push.seen, pixel, seen, r)) {
+    if (!receiver_of(index, r)) {
         return;
     }
     RsmView view = rsm_views[push.view];

@@ -3,8 +3,6 @@
 use super::*;
 use clerestory::Error;
 use clerestory::film::picture::RADIANCE;
-use clerestory::settings::Settings;
-use clerestory::techniques::{View, by_id};
 use clerestory_tests::render::builtin;
 use clerestory_tests::with_gpu;
 
@@ -339,20 +337,6 @@ fn what_cannot_be_is_refused_by_name() {
                 text.contains("range of bounces") && text.contains(words),
                 "{set}: {text}"
             );
-        }
-        // Media that shine, by the scene.
-        let smoke = builtin("builtin:smoke?emission=1");
-        let view = View {
-            camera: &smoke.cameras[0],
-            size: SIZE,
-            seed: 0,
-            aovs: false,
-        };
-        let prepared =
-            by_id("photon").and_then(|info| info.prepare(gpu, upload(gpu, &smoke), &view, &Settings::default()));
-        match prepared {
-            Ok(_) => panic!("smoke that shines was accepted"),
-            Err(error) => assert!(error.to_string().contains("media"), "{error}"),
         }
     });
 }

@@ -4,18 +4,20 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-use super::kernels::{Sight, seen_from};
+use super::kernels::{Seen, Sight, seen_from};
 use super::maps::Maps;
 use super::metropolis::{Chains, Metropolis};
 use super::past::Past;
 use super::reflective::{LightView, Reflective};
 use super::renderer::{Indirect, LightSource, ManyLight};
+use super::reservoirs::Reservoirs;
 use crate::gpu::shaders::types::SeenFrom;
 use crate::gpu::{Access, Area, Pass, Recorder, Timings};
 use crate::raster::{DrawPart, View};
 use crate::scene::camera_frame::CameraFrame;
 use crate::techniques::instant_radiosity::gather::SWEEPS_A_LIGHT;
 use crate::techniques::photon_mapping::Tracing;
+use crate::transport::GpuScene;
 use crate::transport::random::{Sampler, SamplerKind, sample_2d};
 use crate::transport::warp::square_to_disk;
 use crate::{Error, Result};
@@ -90,6 +92,14 @@ struct LightViews {
 }
 
 impl Frame {
+    fn sight<'a>(&self, scene: &'a GpuScene, seen: &'a Seen) -> Sight<'a> {
+        Sight {
+            scene,
+            seen,
+            from: self.from,
+        }
+    }
+
     pub fn has_ended(&self) -> bool {
         matches!(self.stage, Stage::Ended)
     }
@@ -254,11 +264,7 @@ impl ManyLight {
             let (Some(metropolis), Some(seen)) = (own.metropolis(), &own.seen) else {
                 return Ok(());
             };
-            let sight = Sight {
-                scene: &own.scene,
-                seen,
-                from: frame.from,
-            };
+            let sight = frame.sight(&own.scene, seen);
             rays = metropolis.record(recorder, &sight, &chains, frame.is_shown)?;
             Ok(())
         })?;
@@ -407,11 +413,7 @@ impl ManyLight {
                 if !frame.is_shown {
                     seen.show(pass);
                 }
-                let sight = Sight {
-                    scene: &own.scene,
-                    seen,
-                    from: frame.from,
-                };
+                let sight = frame.sight(&own.scene, seen);
                 direct.record(pass, &sight, number, first..end, &own.radiance)?;
                 pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
                 Ok(())
@@ -443,11 +445,7 @@ impl ManyLight {
                 if view == 0 && first == 0 {
                     own.record_black(pass)?;
                 }
-                let sight = Sight {
-                    scene: &own.scene,
-                    seen,
-                    from: frame.from,
-                };
+                let sight = frame.sight(&own.scene, seen);
                 discs.record(pass, &sight, (number, view), first..end, &own.radiance)
             })
         })?;
@@ -473,6 +471,12 @@ impl ManyLight {
         Ok(())
     }
 
+    /// Where the lights of reservoirs come from, these, and what is seen.
+    fn with_reservoirs(&self) -> Option<(&LightSource, &Reservoirs, &Seen)> {
+        let indirect = self.indirect.as_ref()?;
+        Some((&indirect.source, indirect.reservoirs()?, self.seen.as_ref()?))
+    }
+
     /// Lights that a part of the pixels draw.
     fn resample(&mut self, frame: &mut Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
         let Some(reservoirs) = self.indirect.as_ref().and_then(Indirect::reservoirs) else {
@@ -481,21 +485,15 @@ impl ManyLight {
         let (all, number) = (self.pixels(), self.done);
         let end = first.saturating_add(reservoirs.pixels[0]).min(all);
         let timings = self.submit(|own, recorder| {
-            let Some((indirect, reservoirs)) = own.indirect.as_ref().and_then(|own| Some((own, own.reservoirs()?)))
-            else {
+            let Some((source, reservoirs, seen)) = own.with_reservoirs() else {
                 return Ok(());
             };
-            let Some(seen) = &own.seen else { return Ok(()) };
             recorder.pass("many-light: resample", |pass| {
                 if !frame.is_shown {
                     seen.show(pass);
                 }
-                let sight = Sight {
-                    scene: &own.scene,
-                    seen,
-                    from: frame.from,
-                };
-                let lights = (indirect.source.records(), frame.lights);
+                let sight = frame.sight(&own.scene, seen);
+                let lights = (source.records(), frame.lights);
                 reservoirs.record_resample(pass, &sight, lights, number, first..end)
             })
         })?;
@@ -516,22 +514,15 @@ impl ManyLight {
         let (all, number) = (self.pixels(), self.done);
         let end = first.saturating_add(reservoirs.pixels[1]).min(all);
         let timings = self.submit(|own, recorder| {
-            let Some((indirect, reservoirs)) = own.indirect.as_ref().and_then(|own| Some((own, own.reservoirs()?)))
-            else {
+            let Some((source, reservoirs, seen)) = own.with_reservoirs() else {
                 return Ok(());
             };
-            let Some(seen) = &own.seen else { return Ok(()) };
             recorder.pass("many-light: reuse", |pass| {
                 if first == 0 {
                     own.record_black(pass)?;
                 }
-                let sight = Sight {
-                    scene: &own.scene,
-                    seen,
-                    from: frame.from,
-                };
-                let records = indirect.source.records();
-                reservoirs.record_reuse(pass, &sight, records, number, first..end, &own.radiance)
+                let sight = frame.sight(&own.scene, seen);
+                reservoirs.record_reuse(pass, &sight, source.records(), number, first..end, &own.radiance)
             })
         })?;
         if end < all {

@@ -11,12 +11,10 @@ use std::ops::Range;
 use glam::{DVec3, Vec3};
 
 use super::kernels::ray_stopped;
+use super::records::LightRecord;
 use super::settings::ManyLightSettings;
 use crate::accel::NO_HIT;
-use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{
-    KEPT_ABSENT, KEPT_ASKED, KEPT_NEW, KEPT_SEEN, KEPT_STAYS, KEPT_STOPPED, VIRTUAL_LIGHT_QUARTERS,
-};
+use crate::gpu::shaders::constants::{KEPT_ABSENT, KEPT_ASKED, KEPT_NEW, KEPT_SEEN, KEPT_STAYS, KEPT_STOPPED};
 use crate::gpu::shaders::techniques::instant_radiosity::{kept_lights, kept_rays};
 use crate::gpu::shaders::types::{KeptHit, KeptLight};
 use crate::gpu::{
@@ -146,18 +144,12 @@ impl KeptLights {
             let bytes = (count * bytes) as u64;
             gpu.buffer(&BufferDesc::storage(name, bytes, Category::Light))
         };
-        let quarters = u64::from(settings.lights) * u64::from(VIRTUAL_LIGHT_QUARTERS);
         Ok(Self {
             rays: scene.index_traversal().pipeline(gpu, &rays)?,
             write: gpu.compute_pipeline(&write)?,
             requests: storage("requests of kept lights", size_of::<KeptLight>())?,
             hits: storage("ends of kept lights' ways", size_of::<KeptHit>())?,
-            records: gpu.storage_texels(
-                "virtual lights",
-                Category::Light,
-                vk::Format::R32G32B32A32_UINT,
-                quarters,
-            )?,
+            records: LightRecord::texels(gpu, settings.lights)?,
             asked: vec![bytemuck::Zeroable::zeroed(); count],
             lamps: Vec::new(),
             turn: 0,

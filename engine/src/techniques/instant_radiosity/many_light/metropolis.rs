@@ -11,11 +11,11 @@
 //! The source's chains make their paths from the camera, light by light; here they choose among lights that walks have left, of which a new pool is drawn for every frame.
 
 use super::kernels::{Sight, ray_stopped};
+use super::records::LightRecord;
 use super::settings::{ManyLightSettings, Visibility};
 use crate::Result;
-use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{
-    METROPOLIS_POWERS, METROPOLIS_PROPOSALS, METROPOLIS_REFERENCES, METROPOLIS_SEEDS, VIRTUAL_LIGHT_QUARTERS,
+    METROPOLIS_POWERS, METROPOLIS_PROPOSALS, METROPOLIS_REFERENCES, METROPOLIS_SEEDS, VISIBILITY_NONE, VISIBILITY_RAYS,
 };
 use crate::gpu::shaders::techniques::instant_radiosity::{metropolis_accept, metropolis_lights, metropolis_try};
 use crate::gpu::shaders::types::MetropolisTry;
@@ -124,11 +124,12 @@ impl Metropolis {
             separable_masking: false,
             has_alpha: scene.profile().has_alpha(),
             edge_bound: bound.kind(),
-            visibility: match settings.visibility {
-                Visibility::None => Visibility::None,
-                Visibility::Rays | Visibility::Maps | Visibility::Imperfect => Visibility::Rays,
-            }
-            .kind(),
+            // By rays also where maps tell pixels.
+            visibility: if settings.visibility == Visibility::None {
+                VISIBILITY_NONE
+            } else {
+                VISIBILITY_RAYS
+            },
             index_quota: index.quota,
             index_kind: index.kind,
             ..Default::default()
@@ -141,7 +142,6 @@ impl Metropolis {
             let bytes = u64::from(count) * bytes as u64;
             gpu.buffer(&BufferDesc::storage(name, bytes, Category::Light))
         };
-        let quarters = u64::from(settings.lights) * u64::from(VIRTUAL_LIGHT_QUARTERS);
         let counters = size_of::<metropolis_try::MetropolisCounters>();
         Ok(Self {
             tracer,
@@ -158,12 +158,7 @@ impl Metropolis {
             pixels: storage("pixels that measure lights", settings.power_pixels, size_of::<u32>())?,
             weights: storage("weights of chosen lights", settings.lights, size_of::<f32>())?,
             counters: storage("counters of chains", 1, counters)?,
-            records: gpu.storage_texels(
-                "virtual lights",
-                Category::Light,
-                vk::Format::R32G32B32A32_UINT,
-                quarters,
-            )?,
+            records: LightRecord::texels(gpu, settings.lights)?,
             bound,
             lights: settings.lights,
             walks: settings.pool,

@@ -3,14 +3,26 @@
 use glam::Vec3;
 
 use crate::Result;
+use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::VIRTUAL_LIGHT_QUARTERS;
-use crate::gpu::{Gpu, TexelView};
+use crate::gpu::{Category, Gpu, TexelView};
 use crate::techniques::instant_radiosity::VirtualLight;
 
 /// Four quarters of a virtual light.
 pub(super) struct LightRecord([[u32; 4]; VIRTUAL_LIGHT_QUARTERS as usize]);
 
 impl LightRecord {
+    /// Room for so many.
+    pub fn texels(gpu: &Gpu, lights: u32) -> Result<TexelView> {
+        let quarters = u64::from(lights) * u64::from(VIRTUAL_LIGHT_QUARTERS);
+        gpu.storage_texels(
+            "virtual lights",
+            Category::Light,
+            vk::Format::R32G32B32A32_UINT,
+            quarters,
+        )
+    }
+
     /// The first `count` of a buffer. Waits for the device.
     pub fn read(gpu: &Gpu, records: &TexelView, count: u32) -> Result<Vec<Self>> {
         let quarters: Vec<[[u32; 4]; VIRTUAL_LIGHT_QUARTERS as usize]> =

@@ -9,12 +9,11 @@
 
 use glam::Vec3;
 
+use super::records::LightRecord;
 use super::settings::{ManyLightSettings, RsmSequence};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::SampledView;
-use crate::gpu::shaders::constants::{
-    RSM_HALTON, RSM_HAMMERSLEY, RSM_POINT, RSM_RANDOM, RSM_SPOT, RSM_SURFACE, VIRTUAL_LIGHT_QUARTERS,
-};
+use crate::gpu::shaders::constants::{RSM_HALTON, RSM_HAMMERSLEY, RSM_POINT, RSM_RANDOM, RSM_SPOT, RSM_SURFACE};
 use crate::gpu::shaders::techniques::instant_radiosity::{rsm_emitters, rsm_flux, rsm_lights};
 use crate::gpu::shaders::types::{RsmEmitter, RsmTexel, RsmView, SeenFrom};
 use crate::gpu::{
@@ -109,7 +108,6 @@ impl Reflective {
             });
         }
         let storage = |name, bytes| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Light));
-        let quarters = u64::from(settings.lights) * u64::from(VIRTUAL_LIGHT_QUARTERS);
         Ok(Self {
             gbuffer: GBuffer::new(
                 gpu,
@@ -135,12 +133,7 @@ impl Reflective {
             texels: storage("texels of lights' views", bytes)?,
             views: storage("lights' views", u64::from(views) * size_of::<RsmView>() as u64)?,
             total: storage("luminance of lights' views", size_of::<f32>() as u64)?,
-            records: gpu.storage_texels(
-                "virtual lights",
-                Category::Light,
-                vk::Format::R32G32B32A32_UINT,
-                quarters,
-            )?,
+            records: LightRecord::texels(gpu, settings.lights)?,
             side,
             emitter_count,
             lights: settings.lights,
