@@ -276,6 +276,7 @@ impl Lists {
                 .record(pass, &buffers, Count::Host(words), &self.scan_scratch)?;
             after_all(pass);
             self.record_most(pass, 0)?;
+            after_all(pass);
             let all = self.starts.slice(WORD * u64::from(words - 1), WORD);
             pass.copy(all, self.readback.slice(2 * WORD, WORD))
         })

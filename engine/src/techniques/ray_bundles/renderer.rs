@@ -186,7 +186,7 @@ impl RayBundles {
             traversal.pipeline(gpu, &spec)
         });
         let hops = has_surfaces && is_lit && settings.bounces() > 1;
-        let lists = hops.then(|| Lists::new(gpu, settings.raster)).transpose()?;
+        let lists = hops.then(|| Lists::new(gpu, settings.texels(size))).transpose()?;
         let pixels = size[0] * size[1];
         let parts = Part::count(gpu, RAYS * index.steps * u64::from(pixels)).max(settings.parts);
         let vertices = size_of::<BundleVertex>() as u64 * u64::from(pixels);
@@ -358,8 +358,10 @@ impl RayBundles {
         let mut recorder = self.gpu.recorder("ray-bundles")?;
         let left = recorder.passes_left();
         loop {
-            if let Stage::Counted { bounce } = frame.stage {
-                frame.stage = self.read_counts(frame, bounce)?;
+            match frame.stage {
+                Stage::Counted { bounce } => frame.stage = self.read_counts(frame, bounce)?,
+                Stage::Count { bounce, part: 0 } => frame.bundle = self.bundle(bounce)?,
+                _ => {}
             }
             let (next, goes_on) = self.record_stage(&mut recorder, frame)?;
             wrote |= matches!(frame.stage, Stage::Write { .. }) && !matches!(next, Stage::Write { .. });
@@ -393,7 +395,7 @@ impl RayBundles {
     }
 
     /// Records a stage, or a part of it: what comes next, and whether there is room for that in the same submission.
-    fn record_stage(&self, recorder: &mut Recorder, frame: &mut Frame) -> Result<(Stage, bool)> {
+    fn record_stage(&self, recorder: &mut Recorder, frame: &Frame) -> Result<(Stage, bool)> {
         let pixels = self.pixels();
         match frame.stage {
             Stage::Eye(first) => {
@@ -416,9 +418,6 @@ impl RayBundles {
                     (false, true) => Stage::Count { bounce, part: 0 },
                     (false, false) => Stage::Film,
                 };
-                if let Stage::Count { .. } = next {
-                    frame.bundle = self.bundle(bounce)?;
-                }
                 Ok((next, self.pixels_at_once >= pixels))
             }
             Stage::Count { bounce, part } => {
@@ -481,7 +480,7 @@ impl RayBundles {
         }
     }
 
-    /// The bundle behind so many scatterings.
+    /// The bundle behind so many scatterings. May wait for the device.
     fn bundle(&self, bounce: u32) -> Result<Option<Bundle>> {
         let Some(lists) = &self.lists else {
             return Ok(None);
