@@ -298,8 +298,7 @@ fn interfaces_are_told_apart_near_and_far() {
         };
         let error = renderer(gpu, &thin)
             .render(&options)
-            .err()
-            .expect("two sides")
+            .expect_err("two sides")
             .to_string();
         assert!(error.contains("meet a second interface"), "{error}");
 
