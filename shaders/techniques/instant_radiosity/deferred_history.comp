@@ -18,6 +18,7 @@ layout(local_size_x = 64) in;
 #include "techniques/instant_radiosity/history.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/light_color.glsl"
+#include "techniques/instant_radiosity/seen_normals.glsl"
 #include "transport/luminance.glsl"
 
 layout(push_constant, scalar) uniform Push {

@@ -2,8 +2,6 @@
 #ifndef CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_LIGHT_COLOR_GLSL
 #define CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_LIGHT_COLOR_GLSL
 
-const uint SHADING_NORMAL_BITS = 16u;  // of each coordinate, as Output::Normals has them
-
 // By what light is divided before it is mixed: a surface's colour, and nothing where it has none.
 vec3 divisor(vec3 color) { return mix(vec3(1.0), color, greaterThan(color, vec3(0.0))); }
 

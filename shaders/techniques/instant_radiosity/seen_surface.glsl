@@ -4,8 +4,7 @@
 #define CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_SEEN_SURFACE_GLSL
 
 #include "maps/packed_direction.glsl"
-
-const uint SHADING_NORMAL_BITS = 16u;  // of each coordinate, as Output::Normals has them
+#include "techniques/instant_radiosity/seen_normals.glsl"
 
 vec3 seen_normal(ivec2 pixel) { return unpack_octahedral(texelFetch(seen_normals, pixel, 0).y, SHADING_NORMAL_BITS); }
 

@@ -378,7 +378,7 @@ fn what_cannot_be_is_refused_by_name() {
         let mut unlit = hall();
         unlit.materials[0].unlit = true;
         let mut masked = hall();
-        masked.materials[0].alpha_mode = AlphaMode::Mask;
+        masked.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
         masked.materials[0].base_color.w = 0.4;
         for (scene, word) in [
             (builtin("builtin:fog-box"), "media"),
