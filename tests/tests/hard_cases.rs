@@ -52,7 +52,7 @@ fn check_some(kind: impl Fn(&Subject) -> bool, some: impl Fn(&HardCase) -> bool)
 }
 
 /// Subjects that have a test each; all other techniques share one.
-const ALONE: [&str; 8] = [
+const ALONE: [&str; 9] = [
     "path (sobol)",
     "path (pcg)",
     "photon",
@@ -61,6 +61,7 @@ const ALONE: [&str; 8] = [
     "many-light",
     "impostor",
     "localized-gather",
+    "ray-bundles",
 ];
 
 fn check_alone(name: &str) {
@@ -129,6 +130,11 @@ fn impostors_take_the_cases_as_documented() {
 #[test]
 fn localized_gathers_take_the_cases_as_documented() {
     check_alone("localized-gather");
+}
+
+#[test]
+fn ray_bundles_take_the_cases_as_documented() {
+    check_alone("ray-bundles");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //!
 //! A rendering has targets of one size: whole images or parts of them ([`Image::part`]), of one layer, of several that shaders choose
 //! among by `gl_Layer`, or of several views that each primitive goes to. Attachments are images, whose barriers and layouts are the author's.
+//! A rendering of an area without an image is for fragment shaders that write buffers.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -99,11 +100,14 @@ pub struct Targets<'a> {
     pub colors: &'a [Option<ColorTarget<'a>>],
     /// Depth attachment.
     pub depth: Option<DepthTarget<'a>>,
-    /// The part that is filled and drawn into; `None` for all. What is outside it stays as it is.
+    /// The part that is filled and drawn into; `None` for all. What is outside it stays as it is. Where there is no image, the pixels that there are.
     pub area: Option<Area>,
     /// Layers that every primitive is rendered into, one bit a view; 0 for rendering without views.
     pub view_mask: u32,
 }
+
+/// Pixels along a side up to which every device renders without an image.
+const WITHOUT_IMAGE_MAX: u32 = 4096;
 
 /// A rendering that was begun; it ends when this is dropped, by a panic of whoever draws, too.
 struct Rendering {
@@ -129,8 +133,8 @@ impl<'a> Pass<'a> {
     /// Renders into images: `record` draws. Barriers are for before and after.
     ///
     /// # Errors
-    /// [`Error::Picture`] when the targets differ in size, there is none, the area is not in them or they have fewer layers than there are
-    /// views; [`Error::Setting`] for an image of another device or one that was not made to be such a target; [`Error::LimitExceeded`] past
+    /// [`Error::Picture`] when the targets differ in size, there is none and no area of up to 4,096 pixels a side, the area is not in them or they have fewer layers
+    /// than there are views; [`Error::Setting`] for an image of another device or one that was not made to be such a target; [`Error::LimitExceeded`] past
     /// `maxColorAttachments` or `maxMultiviewViewCount`; [`Error::MissingFeature`] on a queue without graphics; whatever `record` returns.
     pub fn render<R>(
         &mut self,
@@ -232,7 +236,11 @@ impl<'a> Pass<'a> {
             })
         };
         let Some(first) = images.first() else {
-            return refuse(self.name, "the pass renders into no image".into());
+            let is_fine = |area: &Area| targets.view_mask == 0 && area.is_in([WITHOUT_IMAGE_MAX; 2]);
+            return match targets.area.filter(is_fine) {
+                Some(area) => Ok((area, 1)),
+                None => refuse(self.name, "the pass renders into no image".into()),
+            };
         };
         let size = first.size();
         if let Some(odd) = images.iter().find(|image| image.size() != size) {

@@ -6,7 +6,7 @@
 //! Parallel views cannot have that: there depth falls linearly from 1 at the origin to 0 behind the scene. Twin of
 //! `raster/bindings.glsl`.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::Surfaces;
 use crate::accel::Ray;
@@ -120,6 +120,28 @@ impl View {
         let (right, down) = forward.any_orthonormal_pair();
         let half_side = f64::from(radius);
         let view = Self::central(origin, [right / half_side, down / half_side, forward], 0.0, area)?;
+        Ok(view.into_parallel(forward, 4.0 * half_side))
+    }
+
+    /// The same in a target of `side` pixels a side, with a pixel more about it and all pixels moved by a part of one, from −½ to ½ across and down, so that over evenly
+    /// distributed shifts the rays of a pixel are even over the width of one. Everything lies before its origin by a pixel's width or more.
+    ///
+    /// # Errors
+    /// As [`View::of_beam`].
+    pub(crate) fn of_shifted_beam(direction: Vec3, surfaces: &Surfaces<'_>, side: u32, shift: DVec2) -> Result<Self> {
+        let [lower, upper] = surfaces.bounds;
+        let radius = 0.5 * f64::from((upper - lower).length());
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        // Half of the pixels are as wide as the sphere and one pixel more.
+        let pixel = 2.0 * radius / f64::from(side.saturating_sub(2).max(1));
+        let half_side = 0.5 * f64::from(side) * pixel;
+        let forward = direction.as_dvec3().normalize();
+        let (right, down) = forward.any_orthonormal_pair();
+        let middle = 0.5 * (lower.as_dvec3() + upper.as_dvec3());
+        let across = shift.x * pixel * right + shift.y * pixel * down;
+        let origin = (middle + across - (radius + pixel) * forward).as_vec3();
+        let rows = [right / half_side, down / half_side, forward];
+        let view = Self::central(origin, rows, 0.0, Area::whole([side; 2]))?;
         Ok(view.into_parallel(forward, 4.0 * half_side))
     }
 
@@ -246,6 +268,11 @@ impl View {
         let behind = -(normal.dot(start) + row[3]);
         let meets = || if along > 0.0 { behind / along } else { f32::INFINITY };
         is_cut.then(meets)
+    }
+
+    /// What kernels know of it.
+    pub(crate) fn record(&self) -> RasterView {
+        self.record
     }
 
     /// Where rays begin, metres; of parallel views, the middle of where they do.

@@ -80,6 +80,7 @@ methods! {
     bidirectional,
     impostors,
     localized_gather,
+    ray_bundles,
     + instant_radiosity::MANY_LIGHT,
 }
 

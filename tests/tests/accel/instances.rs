@@ -164,7 +164,7 @@ fn by_technique(gpu: &Gpu, scene: &Scene, technique: &str, index: &str) -> Resul
 }
 
 /// Techniques that draw triangle by triangle, and refuse scenes that keep their instances.
-const DRAWN: [&str; 4] = ["preview", "many-light", "impostor", "localized-gather"];
+const DRAWN: [&str; 5] = ["preview", "many-light", "impostor", "localized-gather", "ray-bundles"];
 
 #[test]
 fn other_techniques_render_kept_instances_or_refuse_them() {

@@ -6,6 +6,7 @@
 
 mod agreement;
 mod edge_cases;
+mod ray_bundles;
 mod strategies;
 
 use clerestory::film::z_test::{SIGNIFICANCE, z_test};

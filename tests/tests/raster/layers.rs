@@ -292,6 +292,41 @@ fn clip_distances_cut_and_areas_confine() {
 }
 
 #[test]
+fn an_area_of_what_every_device_renders_needs_no_image() {
+    with_gpu(|gpu| {
+        let area = |x, y, width, height| Area {
+            offset: [x, y],
+            size: [width, height],
+        };
+        let mut recorder = gpu.recorder("nothing").expect("recorder");
+        let recorded = recorder.pass("without an image", |pass| {
+            let of = |area, view_mask| Targets {
+                area,
+                view_mask,
+                ..Targets::default()
+            };
+            pass.render(&of(Some(area(3, 0, 4093, 4096)), 0), |_| Ok(()))?;
+            for refused in [
+                of(None, 0),
+                of(Some(area(0, 0, 4097, 1)), 0),
+                of(Some(area(0, 1, 1, 4096)), 0),
+                of(Some(area(0, 0, 0, 1)), 0),
+                of(Some(area(0, 0, 1, 1)), 1),
+            ] {
+                let result = pass.render(&refused, |_| Ok(()));
+                assert!(matches!(result, Err(Error::Picture { .. })), "{refused:?}: {result:?}");
+            }
+            Ok(())
+        });
+        recorded.expect("recorded");
+        recorder
+            .submit()
+            .and_then(|submission| submission.wait())
+            .expect("device");
+    });
+}
+
+#[test]
 fn depths_compare_as_told_and_counts_come_from_buffers() {
     with_gpu(|gpu| {
         let target = numbers(gpu, 1, 1);

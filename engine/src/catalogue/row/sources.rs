@@ -69,6 +69,7 @@ sources! {
     HEIDRICH_SEIDEL_1998 = "heidrich-seidel-1998": "W. Heidrich, H.-P. Seidel", "View-Independent Environment Maps", "Graphics Hardware", 1998;
     HEITZ_2014 = "heitz-2014": "E. Heitz", "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", "JCGT 3(2)", 2014;
     HENYEY_GREENSTEIN_1941 = "henyey-greenstein-1941": "L. Henyey, J. Greenstein", "Diffuse Radiation in the Galaxy", "ApJ 93", 1941;
+    HERMES_2010 = "hermes-2010": "T. Hermes, N. Henrich, T. Grosch, S. Müller", "Global Illumination using Parallel Global Ray-Bundles", "VMV", 2010;
     HOER_LOVE_1965 = "hoer-love-1965": "C. Hoer, C. Love", "Exact Inductance Equations for Rectangular Conductors", "J. Res. NBS 69C", 1965;
     HOFFMAN_2019 = "hoffman-2019": "N. Hoffman", "Fresnel Equations Considered Harmful", "Eurographics Workshop on Material Appearance Modeling", 2019;
     HOLBERT_2011 = "holbert-2011": "D. Holbert", "Saying Goodbye to Shadow Acne", "GDC", 2011;
@@ -159,7 +160,9 @@ sources! {
     SZIRMAY_KALOS_2005 = "szirmay-kalos-2005": "L. Szirmay-Kalos, B. Aszódi, I. Lazányi, M. Premecz", "Approximate Ray-Tracing on the GPU with Distance Impostors", "CGF 24(3)", 2005;
     SZIRMAY_KALOS_2009 = "szirmay-kalos-2009": "L. Szirmay-Kalos, T. Umenhoffer, G. Patow, L. Szécsi, M. Sbert", "Specular Effects on the GPU: State of the Art", "CGF 28(6)", 2009;
     SZIRMAY_KALOS_LAZANYI_2006 = "szirmay-kalos-lazanyi-2006": "L. Szirmay-Kalos, I. Lazányi", "Indirect Diffuse and Glossy Illumination on the GPU", "SCCG", 2006;
+    SZIRMAY_KALOS_PURGATHOFER_1998 = "szirmay-kalos-purgathofer-1998": "L. Szirmay-Kalos, W. Purgathofer", "Global Ray-bundle Tracing with Hardware Acceleration", "EGWR", 1998;
     TALBOT_2005 = "talbot-2005": "J. Talbot, D. Cline, P. Egbert", "Importance Resampling for Global Illumination", "EGSR", 2005;
+    TOKUYOSHI_OGAKI_2012 = "tokuyoshi-ogaki-2012": "Y. Tokuyoshi, S. Ogaki", "Real-Time Bidirectional Path Tracing via Rasterization", "I3D", 2012;
     TURK_1994 = "turk-1994": "G. Turk", "The PLY Polygon File Format", "", 1994;
     UMENHOFFER_2007 = "umenhoffer-2007": "T. Umenhoffer, G. Patow, L. Szirmay-Kalos", "Robust Multiple Specular Reflections and Refractions", "GPU Gems 3", 2007;
     VAN_OOSTEROM_STRACKEE_1983 = "van-oosterom-strackee-1983": "A. van Oosterom, J. Strackee", "The Solid Angle of a Plane Triangle", "IEEE Transactions on Biomedical Engineering 30(2)", 1983;

@@ -1,0 +1,35 @@
+#version 460
+// What the lines of a bundle meet of surfaces, all of it, whatever is in front: each fragment counts itself in its texel, or, drawn once more, writes itself to the texel's
+// list, in any order, and counts itself off again.
+//
+// SVO-G6: lists by count and scan in place of the linked lists of T. Hermes, N. Henrich, T. Grosch, S. Müller, "Global Illumination using Parallel Global Ray-Bundles", VMV 2010.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(constant_id = 0) const bool WRITES = true;
+layout(constant_id = 1) const uint BUNDLE_SIDE = 512u;  // texels
+
+#include "raster/hit.glsl"
+#include "techniques/ray_bundles/bundle_list.glsl"
+
+layout(location = 0) flat in uint raster_triangle;
+layout(location = 1) flat in uint raster_view;
+
+layout(set = 1, binding = 0, scalar) restrict buffer BundleCounts { uint bundle_counts[]; };
+layout(set = 1, binding = 1, scalar) restrict readonly buffer BundleStarts { uint bundle_starts[]; };
+layout(set = 1, binding = 2, scalar) restrict writeonly buffer BundleFragments { BundleFragment bundle_fragments[]; };
+
+void main() {
+    uint texel = bundle_texel(uvec2(gl_FragCoord.xy), BUNDLE_SIDE);
+    if (!WRITES) {
+        atomicAdd(bundle_counts[texel], 1u);
+        return;
+    }
+    uint left = atomicAdd(bundle_counts[texel], 0xFFFFFFFFu);
+    // More than were counted: what is left is no 0, which the host sees.
+    if (left == 0u) {
+        return;
+    }
+    RasterHit hit = raster_hit(raster_views[raster_view], load_triangle(raster_triangle), gl_FragCoord.xy);
+    bundle_fragments[bundle_starts[texel] + left - 1u] = BundleFragment(max(hit.distance, 0.0), raster_triangle, texel);
+}
