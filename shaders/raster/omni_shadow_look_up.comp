@@ -7,6 +7,7 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "raster/omni_shadow_set.glsl"
+#include "raster/shadow_query.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 light;
@@ -14,12 +15,6 @@ layout(push_constant, scalar) uniform Push {
     uint map;
     int side;
 } push;
-
-struct ShadowQuery {
-    vec3 position;
-    float slack;
-    vec3 normal;
-};
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { ShadowQuery queries[]; };
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer Shares { float shares[]; };

@@ -74,6 +74,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::raster::splat_atlas::ROWS,
     crate::raster::splats::ROWS,
     crate::raster::tessellation::ROWS,
+    crate::raster::view_shadow::ROWS,
     crate::render::spectral::ROWS,
     crate::scene::builtin::ROWS,
     crate::scene::gltf::ROWS,

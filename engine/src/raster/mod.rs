@@ -6,7 +6,7 @@
 //! T. Saito and T. Takahashi, "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); T. Engelhardt, "Efficient Visibility for
 //! Realistic Rendering", 2013, §2.1 (both forms of visibility) and §7.2 (octahedra rendered live).
 //!
-//! [`OmniShadowMaps`] keep the distances that point lights see in all directions, and say which places their light reaches;
+//! [`OmniShadowMaps`] keep the distances that point lights see in all directions, [`ViewShadowMaps`] those that spots and parallel light see, and say which places their light reaches;
 //! [`SplatAtlas`](splat_atlas::SplatAtlas) keeps those of many lights, drawn at once from points of the surfaces.
 //!
 //! Guarantee: what is seen at a pixel is what the ray through its centre meets, but where that centre lies within the rounding of vertices
@@ -29,6 +29,7 @@ pub mod splats;
 mod surfaces;
 pub mod tessellation;
 mod view;
+pub(crate) mod view_shadow;
 
 pub(crate) use coverage::{Coverage, DrawPart};
 pub use gbuffer::{GBuffer, GBufferDesc};
@@ -43,3 +44,7 @@ pub use output::Output;
 pub use pipelines::Layering;
 pub use surfaces::{ObjectTriangles, SurfaceFeatures, Surfaces};
 pub use view::View;
+pub use view_shadow::{
+    ViewReceiver, ViewShadowDesc, ViewShadowImage, ViewShadowMaps, shadow_view_place, shadow_view_ray,
+    shadow_view_receiver, shadow_view_threshold,
+};

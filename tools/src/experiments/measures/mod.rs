@@ -183,6 +183,7 @@ measures! {
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
     on_host "virtual-images" impostors::virtual_images;
+    on_device "view-shadows" preview::view_shadows;
     on_device "volume-bandwidths" photons::volume_bandwidths;
     on_device "vpl-history" virtual_lights::vpl_history;
     on_device "vpl-incremental" virtual_lights::vpl_incremental;

@@ -10,4 +10,5 @@ pub mod reflection_maps;
 mod reflection_stages;
 pub mod shadow_maps;
 mod shadow_places;
+pub mod view_shadows;
 pub mod vpl_warp;
