@@ -80,6 +80,8 @@ pub struct MediaUse {
     pub scatters: bool,
     /// Some medium emits.
     pub emits: bool,
+    /// That outside all bodies emits everywhere.
+    pub emits_endlessly: bool,
     /// Some medium's extinction coefficient differs between the RGB bands, so that one free flight cannot serve all of them exactly.
     pub chromatic: bool,
     /// Phase functions of those that scatter.
@@ -286,7 +288,9 @@ impl SceneProfile {
             }
         }
         let medium_of = |index: u32| scene.media.get(index as usize).filter(|medium| !medium.is_empty());
-        profile.media.surrounding = scene.surrounding.is_some_and(|index| medium_of(index).is_some());
+        let surrounding = scene.surrounding.and_then(medium_of);
+        profile.media.surrounding = surrounding.is_some();
+        profile.media.emits_endlessly = surrounding.is_some_and(Medium::emits_everywhere);
         media.sort_unstable();
         media.dedup();
         for medium in media.into_iter().filter_map(medium_of) {

@@ -20,6 +20,8 @@ layout(push_constant, scalar) uniform Push {
     vec3 scene_upper;
     WalkKey key;   // the sequence is the pass, places in it photons
     uint photons;  // of the pass
+    float share;   // of them that lights send
+    float weight;  // of these, the reciprocal
 } push;
 
 #include "walk/draws.glsl"
@@ -53,10 +55,10 @@ void main() {
     Emission e = emit(point, sampler_bits(walk_sampler(slot, DIMENSION_START_DIRECTION)), push.scene_lower, push.scene_upper, push.radius);
     uint bounce = path_set_joined(0u, PHOTON_UNDIFFUSED);
     float survival = EVEN_SURVIVAL ? even_survival(slot) : 1.0;
-    walk_states_out[slot] = WalkState(e.origin, survival, normalize(e.direction), bounce, e.power, 0.0);
+    walk_states_out[slot] = WalkState(e.origin, survival, normalize(e.direction), bounce, e.power * push.weight, 0.0);
     walk_gathered[slot] = GatheredLight(vec3(0.0), e.interior);
     if (HAS_DIFFERENTIALS) {
         // Only so many photons are of this light.
-        photon_differentials[slot] = roulette_differentials(emitted_differentials(e), e.probability);
+        photon_differentials[slot] = roulette_differentials(emitted_differentials(e), push.share * e.probability);
     }
 }

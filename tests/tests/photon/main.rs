@@ -11,6 +11,7 @@ mod determinism;
 mod flux;
 mod footprints;
 mod furnace;
+mod glow;
 mod lights;
 mod maps;
 mod materials;

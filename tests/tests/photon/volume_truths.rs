@@ -14,13 +14,13 @@ use glam::DVec3;
 const ESTIMATES: [VolumeEstimate; 3] = [VolumeEstimate::Ray, VolumeEstimate::March, VolumeEstimate::Beams];
 
 /// Parallel rays from `eye` along `forward`, over a square of `half_height` to either side.
-fn parallel(eye: DVec3, forward: DVec3, half_height: f32) -> Camera {
+pub(super) fn parallel(eye: DVec3, forward: DVec3, half_height: f32) -> Camera {
     let mut camera = Camera::look_at("rays", eye, eye + forward, forward.any_orthonormal_vector(), 1.0);
     camera.projection = Projection::Orthographic { half_height };
     camera
 }
 
-fn exactly(value: f64) -> Mean {
+pub(super) fn exactly(value: f64) -> Mean {
     Mean { value, variance: 0.0 }
 }
 

@@ -71,4 +71,9 @@ impl Medium {
         let nothing = self.sigma_t() == Vec3::ZERO && self.emission == Vec3::ZERO;
         nothing || self.density.as_ref().is_some_and(|grid| grid.max() == 0.0)
     }
+
+    /// Whether light is added wherever it is, without a grid that has an end.
+    pub(crate) fn emits_everywhere(&self) -> bool {
+        self.emission != Vec3::ZERO && self.density.is_none()
+    }
 }

@@ -10,8 +10,8 @@ use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::path::path_shade;
 use crate::gpu::shaders::techniques::photon_mapping::{
     photon_append, photon_beam, photon_boxes, photon_emit, photon_event_boxes, photon_event_leaves, photon_gather,
-    photon_gather_packet, photon_leaf_size, photon_leaves, photon_medium, photon_scatter, photon_volume_append,
-    photon_volume_flags,
+    photon_gather_packet, photon_glow, photon_leaf_size, photon_leaves, photon_medium, photon_scatter,
+    photon_volume_append, photon_volume_flags,
 };
 use crate::kernels::{RadixSort, Scan};
 use crate::scene::SceneProfile;
@@ -88,8 +88,10 @@ fn law(settings: &Settings) -> Result<Law> {
 /// Why a scene cannot be modelled.
 pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
     let mut reasons = Vec::new();
-    if profile.media.emits {
-        reasons.push("the scene has participating media that emit light, which no photon carries".into());
+    if profile.media.emits_endlessly {
+        reasons.push(
+            "the scene has an endless participating medium that emits everywhere, more than photons carry".into(),
+        );
     }
     let from_infinity = profile.has_environment() || profile.lights.directional > 0;
     if profile.media.surrounding && from_infinity {
@@ -101,8 +103,9 @@ pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
 }
 
 /// What a picture may take with default settings, of whatever scene, beside what eye paths do.
-const KERNELS: [&ShaderInfo; 8] = [
+const KERNELS: [&ShaderInfo; 9] = [
     &photon_emit::INFO,
+    &photon_glow::INFO,
     &photon_medium::INFO,
     &photon_scatter::INFO,
     &photon_append::INFO,
@@ -191,7 +194,7 @@ impl Technique for PhotonMapper {
         if !self.has_map() {
             skipped.push(Skipped {
                 what: "photons and their map",
-                why: "no light can be chosen, or the path set has nothing of a map",
+                why: "nothing sends light, or the path set has nothing of a map",
             });
         }
         if self.profile().has_unlit {
@@ -211,7 +214,7 @@ const ROWS: &[Row] = &[Row {
     id: "PM-SYS-1",
     name: "technique `photon`: direct light and specular chains by rays, all else from a photon map, rebuilt for each pass (stochastic progressive photon mapping)",
     role: Role::Technique,
-    limits: "Refuses media that emit and endless media with light from infinity; light of unlit surfaces beyond the first diffuse reflection is missing, and glossy lobes never use the map.",
+    limits: "Refuses endless media that emit everywhere or have light from infinity; light of unlit surfaces beyond the first diffuse reflection is missing, and glossy lobes never use the map.",
     sources: &[
         sources::JENSEN_2001.whole(),
         sources::HACHISUKA_JENSEN_2009.whole(),

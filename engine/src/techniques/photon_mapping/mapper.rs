@@ -38,6 +38,11 @@ use crate::transport::GpuScene;
 use crate::walk::ArrivalStage;
 use crate::{Error, Result};
 
+/// Whether photons have somewhere to start.
+pub(super) fn sends_photons(scene: &GpuScene) -> bool {
+    scene.has_lights() || scene.glow().is_some()
+}
+
 /// Exact counts, and what the host's share took.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 #[non_exhaustive]
@@ -122,9 +127,10 @@ impl PhotonMapper {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene with media that emit, or with light from infinity in an endless one, and for a path set
+    /// [`Error::Setting`](crate::Error::Setting) for a setting or size out of range, [`Error::Unsupported`](crate::Error::Unsupported) for a scene whose endless medium emits everywhere, or has light from infinity, and for a path set
     /// that is neither a range of bounces nor an expression, [`Error::MissingFeature`](crate::Error::MissingFeature) for packets of queries on
-    /// a device without votes, [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    /// a device without votes, [`Error::LimitExceeded`](crate::Error::LimitExceeded) for media that emit among bodies of more than 8,192 triangles,
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn new(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -168,7 +174,7 @@ impl PhotonMapper {
             full_waves: false,
             ..PathTracerSettings::default()
         };
-        let has_map = settings.needs_photons() && scene.has_lights();
+        let has_map = settings.needs_photons() && sends_photons(&scene);
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
             let (plan, ways) = (settings.plan(has_media), settings.stores_ways());

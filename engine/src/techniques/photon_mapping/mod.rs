@@ -5,6 +5,7 @@ pub mod kernel;
 mod card;
 mod device_map;
 mod gather;
+mod glow;
 mod map;
 mod mapper;
 mod path_classes;

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use super::mapper::sends_photons;
 use super::{PhotonMapper, PhotonSettings};
 use crate::Result;
 use crate::gpu::Gpu;
@@ -38,7 +39,7 @@ pub(super) fn event_share(
     (camera, size): (&Camera, [u32; 2]),
     settings: &PhotonSettings,
 ) -> Result<f64> {
-    let chooses = settings.radius_is_automatic() && settings.needs_photons() && scene.has_lights();
+    let chooses = settings.radius_is_automatic() && settings.needs_photons() && sends_photons(scene);
     if !chooses || scene.extinctions().is_none() {
         return Ok(1.0);
     }

@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 
+use super::glow::GlowStage;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
 use super::volume::footprint::EventKernelSettings;
@@ -251,6 +252,8 @@ struct Kit {
     capacity: u32,
     /// [`GpuScene::emission_choice`].
     emission: Option<TexelView>,
+    /// Only where media emit.
+    glow: Option<GlowStage>,
     /// Only in scenes with media.
     volume: Option<VolumeTrace>,
     /// Of expressions: successors of classes, and those by scattering in media.
@@ -344,6 +347,7 @@ impl PhotonTracer {
                 records: record_texels(gpu, capacity, quarters)?,
                 capacity,
                 emission: scene.emission_choice(gpu)?,
+                glow: GlowStage::new(gpu, &scene, &plan)?,
                 volume,
                 classes: match classes {
                     Some(classes) => {
@@ -387,6 +391,7 @@ impl PhotonTracer {
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let kit = &self.kit;
         let mut all = vec![kit.emit.info(), kit.scatter.info()];
+        all.extend(kit.glow.iter().map(GlowStage::pipeline));
         match &kit.volume {
             Some(volume) => all.extend(volume.pipelines()),
             None => all.push(kit.append.pipeline()),
@@ -533,14 +538,9 @@ impl Kit {
     }
 }
 
-impl WalkStages for PhotonStages<'_> {
-    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
-        self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.reset(pass))?;
-        pass.fill(self.kit.counters.view(), 0)
-    }
-
-    /// Photons leave the lights.
-    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+impl PhotonStages<'_> {
+    /// Photons leave the lights, which send that share of them.
+    fn record_lights(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, share: f64) -> Result<()> {
         let kit = self.kit;
         let [lower, upper] = kit.scene.bounds();
         let push = photon_emit::Push {
@@ -549,6 +549,8 @@ impl WalkStages for PhotonStages<'_> {
             scene_upper: upper.to_array(),
             key: self.key,
             photons: kit.photons,
+            share: share as f32,
+            weight: (1.0 / share) as f32,
         };
         recorder.pass("photon: emit", |pass| {
             let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
@@ -556,6 +558,26 @@ impl WalkStages for PhotonStages<'_> {
             pass.dispatch(&kit.emit, &[wave, &scene, &own], &push, groups)?;
             stage_barrier(pass);
             Ok(())
+        })
+    }
+}
+
+impl WalkStages for PhotonStages<'_> {
+    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.reset(pass))?;
+        pass.fill(self.kit.counters.view(), 0)
+    }
+
+    /// Photons leave the lights, or start in media that emit.
+    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
+        let kit = self.kit;
+        let share = 1.0 - kit.glow.as_ref().map_or(0.0, GlowStage::share);
+        if share > 0.0 {
+            self.record_lights(recorder, wave, share)?;
+        }
+        let Some(glow) = &kit.glow else { return Ok(()) };
+        recorder.pass("photon: glow", |pass| {
+            glow.record(pass, wave, &kit.scene, &kit.differentials, self.key)
         })
     }
 
@@ -640,13 +662,13 @@ impl WalkStages for PhotonStages<'_> {
 
 type Counters = photon_scatter::PhotonCounters;
 
-/// What fluxes are multiplied by before they are stored: over the lights' power, so that a record's is about this. Records hold up to 65408,
+/// What fluxes are multiplied by before they are stored: over the power of lights and of media that emit, so that a record's is about this. Records hold up to 65408,
 /// with full precision down to 2⁻¹⁶; choices that share less than by power are within a factor of thirty.
 const STORED_FLUX: f64 = 256.0;
 
 /// See [`STORED_FLUX`].
 pub(super) fn flux_scale(scene: &GpuScene) -> f64 {
-    let power = scene.light_power();
+    let power = scene.light_power() + scene.glow().map_or(0.0, |glow| glow.power);
     if power > 0.0 { STORED_FLUX / power } else { 1.0 }
 }
 
@@ -668,14 +690,17 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-PH-1",
         name: "photon tracing from every kind of light",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Unlit surfaces and media that emit send no photons.",
+        limits: "Unlit surfaces send no photons; of media that emit those without end must have a grid, and their bodies no more than 8,192 triangles.",
         sources: &[
             sources::JENSEN_2001.whole(),
             sources::FABIANOWSKI_2011.at("§3.4.1 and §5.2.3"),
+            sources::VAN_OOSTEROM_STRACKEE_1983.whole(),
         ],
         shaders: &[
             "shaders/transport/emission.glsl",
+            "shaders/transport/glow.glsl",
             "shaders/techniques/photon_mapping/photon_emit.comp",
+            "shaders/techniques/photon_mapping/photon_glow.comp",
             "shaders/techniques/photon_mapping/photon_scatter.comp",
             "shaders/techniques/photon_mapping/photon_append.comp",
         ],
@@ -689,6 +714,10 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
             "tests/tests/photon/materials.rs::lights_inside_a_body_that_absorbs_shine_through_it",
             "engine/src/transport/gpu_scene/bodies.rs::lights_know_which_body_is_around_them",
+            "engine/src/transport/gpu_scene/glow.rs::tries_find_places_as_often_as_they_should",
+            "tests/tests/photon/glow.rs::furnaces_stay_even_with_media_as_warm_as_their_walls",
+            "tests/tests/photon/glow.rs::media_that_emit_agree_with_the_path_tracer",
+            "tests/tests/photon/glow.rs::photons_of_media_carry_what_these_emit",
         ],
         settings: &["photons"],
         ..Row::of(file!())

@@ -12,8 +12,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::geometry::{Geometry, corners_of, numbered_instances};
-use crate::gpu::shaders::constants::{LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE};
-use crate::gpu::shaders::types::SceneLight;
+use crate::gpu::shaders::constants::{LIGHT_POINT, LIGHT_SPOT, LIGHT_TRIANGLE, NO_MEDIUM};
+use crate::gpu::shaders::types::{GlowBody, SceneLight};
 use crate::scene::{Instance, LightKind, Material, Mesh, Scene, SceneProfile};
 
 /// The bodies of a scene.
@@ -109,6 +109,37 @@ impl Bodies {
         self.innermost(point, 0.0)
     }
 
+    /// A box around the bodies of these materials; `None` without any.
+    pub(super) fn bounds_of(&self, is_one: impl Fn(u32) -> bool) -> Option<[DVec3; 2]> {
+        let bounds = self.0.iter().filter(|body| is_one(body.material)).map(Body::bounds);
+        bounds.reduce(|[a, b], [lower, upper]| [a.min(lower), b.max(upper)])
+    }
+
+    /// The bodies whose boxes are `reached`, from the least one on, as photons of media that emit read them, and nine numbers for each of their triangles.
+    pub(super) fn glow_bodies(
+        &self,
+        scene: &Scene,
+        reached: impl Fn(&[DVec3; 2]) -> bool,
+    ) -> (Vec<GlowBody>, Vec<f32>) {
+        let with_volume = self.0.iter().filter(|body| body.volume > 0.0);
+        let mut found: Vec<&Body> = with_volume.filter(|body| reached(&body.bounds())).collect();
+        found.sort_by(|a, b| a.volume.total_cmp(&b.volume));
+        let (mut records, mut corners) = (Vec::new(), Vec::new());
+        for body in found {
+            records.push(GlowBody {
+                lower: body.lower.as_vec3().to_array(),
+                first: (corners.len() / 9) as u32,
+                upper: body.upper.as_vec3().to_array(),
+                triangles: body.triangles.len() as u32,
+                material: body.material,
+                medium: scene.materials[body.material as usize].interior.unwrap_or(NO_MEDIUM),
+                ..GlowBody::default()
+            });
+            corners.extend(body.triangles.iter().flatten().flat_map(Vec3::to_array));
+        }
+        (records, corners)
+    }
+
     /// Writes to a light without area which body is around it.
     pub(super) fn enclose_point(&self, light: &mut SceneLight) {
         if matches!(light.kind, LIGHT_POINT | LIGHT_SPOT) {
@@ -198,6 +229,10 @@ impl Body {
             upper,
             volume,
         }
+    }
+
+    fn bounds(&self) -> [DVec3; 2] {
+        [self.lower, self.upper]
     }
 
     /// Whether a point is in the box around it.

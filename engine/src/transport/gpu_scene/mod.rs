@@ -6,6 +6,7 @@
 mod airlight;
 mod bodies;
 mod geometry;
+mod glow;
 mod index;
 mod kept;
 mod light_tree;
@@ -23,6 +24,7 @@ use glam::{DVec3, Vec3};
 
 use self::bodies::Bodies;
 use self::geometry::{Geometry, check_placed, visible_objects};
+pub(crate) use self::glow::Glow;
 use self::index::{index_for, index_over_instances};
 use self::kept::{Keeping, KeptInstances, Room};
 use self::light_tree::TreeOfLights;
@@ -55,6 +57,8 @@ pub struct GpuScene {
     surface_area: f64,
     light_power: f64,
     light_kinds: LightKinds,
+    /// Only where media emit.
+    glow: Option<Glow>,
     airlight_helps: bool,
     /// What photons choose by, where light sampling leaves some to scattered rays.
     emission_cdf: Option<Vec<f32>>,
@@ -208,6 +212,9 @@ impl GpuScene {
         let buffers = SceneBuffers::upload(gpu, &geometry, &records, &textures, &lights, albedo)?;
         let has_media = profile.media.any();
         let media = has_media.then(|| GpuMedia::new(gpu, scene)).transpose()?;
+        let surrounding = media.as_ref().and_then(|media| media.surrounding);
+        let glow = bodies.as_ref().filter(|_| profile.media.emits);
+        let glow = glow.and_then(|bodies| Glow::new(scene, surrounding, bodies));
         Ok(Self {
             bsdf,
             // What is rasterized is drawn triangle by triangle.
@@ -220,6 +227,7 @@ impl GpuScene {
             surface_area: geometry.surface_area(),
             light_power: lights.power,
             light_kinds: lights.kinds(),
+            glow,
             airlight_helps: airlight::airlight_helps(scene),
             emission_cdf: lights.emission_cdf,
             punctual_lights: lights.punctual,
@@ -331,6 +339,11 @@ impl GpuScene {
     /// as the bounding sphere of the scene.
     pub fn light_power(&self) -> f64 {
         self.light_power
+    }
+
+    /// Where photons of media that emit start.
+    pub(crate) fn glow(&self) -> Option<&Glow> {
+        self.glow.as_ref()
     }
 
     /// True when there is anything for light sampling to choose.

@@ -77,7 +77,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-VOL-7",
         name: "beam estimate: one query of the volume map per ray, in corrected units (PM-VOL-6 are the original ones)",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Single scattering is the eye paths' by default; emissive media are refused; in a grid light from an event passes by chance, which costs noise.",
+        limits: "Single scattering is the eye paths' by default; in a grid light from an event passes by chance, which costs noise.",
         sources: &[
             sources::FABIANOWSKI_2011.at("§7.1"),
             sources::JAROSZ_2008.whole(),
