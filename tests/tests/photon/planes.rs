@@ -70,7 +70,6 @@ fn planes_and_beams_have_every_path_once() {
         let (low, high) = (Vec3::new(0.55, -0.5, -0.5), Vec3::new(0.8, 0.2, 0.5));
         scene.place(cuboid("second box", boundary.unwrap_or(0), low, high));
         let reference = traced(gpu, &scene, "bounces=2..4", 1024);
-        let mut energies = Vec::new();
         for volume in [VolumeEstimate::Beams, VolumeEstimate::Planes] {
             let settings = PhotonSettings {
                 volume,
@@ -81,9 +80,8 @@ fn planes_and_beams_have_every_path_once() {
             let found = means(gpu, &scene, &settings, 16);
             // As of beams in one box (`volume.rs`).
             found.expect_same_as(&format!("{volume:?}"), &reference, [1.5e-2; 3]);
-            energies.push(found.parts[0]);
+            assert!(found.counts.beams.photons > 1000);
         }
-        println!("{energies:?}");
     });
 }
 

@@ -681,7 +681,10 @@ fn planes_agree_with_their_twins() {
             assert_eq!([result.bits(3), result.bits(4)], [back.medium, back.bounce]);
             assert_eq!(Vec3::from_slice(&result.0[5..]), back.first);
             let least = least_extinction(v3(&x, 20));
-            assert!(result.0[12] == least as f32 || least.is_infinite() && result.0[12] > 1e38, "{least}");
+            assert!(
+                result.0[12] == least as f32 || least.is_infinite() && result.0[12] > 1e38,
+                "{least}"
+            );
             if !is_plane(&words) {
                 assert_eq!(result.0[11], 0.0);
                 continue;

@@ -4,11 +4,11 @@
 //!
 //! Guarantees: a ray's query visits every kernel that it pierces; the same bytes on any number of threads, by host and device.
 
-use super::{VolumeEstimate, VolumeKernel};
 use super::event::{EventWords, MEDIUM_WORD, event_box, set_event_radius, unpack_beam, unpack_event};
 use super::footprint::EventKernelSettings;
 use super::neighbor::{NEIGHBORS, neighbor_radii};
 use super::plane::plane_corners;
+use super::{VolumeEstimate, VolumeKernel};
 use crate::accel::Aabb;
 use crate::accel::lbvh::SortedCodes;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
@@ -17,9 +17,7 @@ use crate::accel::photon_map::complete_bvh::CompleteBvh;
 use crate::accel::photon_map::device::{MapBuffers, MapBuilder};
 use crate::accel::photon_map::merge::merged_hierarchy;
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{
-    COMPACT_NOTHING, EVENT_LEAF_END, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE,
-};
+use crate::gpu::shaders::constants::{COMPACT_NOTHING, EVENT_LEAF_END, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_event_boxes, photon_event_leaves};
 use crate::gpu::shaders::types::CompactRoot;
 use crate::gpu::{Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Submission, TexelView};

@@ -146,9 +146,11 @@ mod tests {
             let bounds = event_box(low, high, 0.0);
             for i in 0..=8 {
                 for j in 0..=8 {
-                    let at =
-                        plane.start + plane.first * (i as f32 / 8.0) + plane.second * (j as f32 / 8.0);
-                    assert!(bounds.lower.cmple(at).all() && bounds.upper.cmpge(at).all(), "{at} {bounds:?}");
+                    let at = plane.start + plane.first * (i as f32 / 8.0) + plane.second * (j as f32 / 8.0);
+                    assert!(
+                        bounds.lower.cmple(at).all() && bounds.upper.cmpge(at).all(),
+                        "{at} {bounds:?}"
+                    );
                 }
             }
             let beam = pack_plane(&PhotonPlane {
@@ -171,7 +173,10 @@ mod tests {
             let by_plane = start + met.along[0] * first + met.along[1] * second;
             assert!(by_ray.distance(by_plane) < 1e-12 / met.volume, "{met:?}");
         }
-        assert_eq!(meet_plane(DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::Z).volume, 0.0);
+        assert_eq!(
+            meet_plane(DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::Z).volume,
+            0.0
+        );
         // Bands without extinction are none that flights end in.
         assert_eq!(least_extinction(DVec3::new(0.0, 3.0, 2.0)), 2.0);
     }
