@@ -534,7 +534,7 @@ fn volume_photons(arguments: &[&str]) -> (image::RgbImage, String) {
 
 #[test]
 fn photons_in_media_have_the_same_light_by_every_estimate() {
-    let [march, ray, beams] = ["march", "ray", "beams"].map(|volume| {
+    let [march, ray, beams, planes] = ["march", "ray", "beams", "planes"].map(|volume| {
         let (picture, text) = volume_photons(&["--volume", volume]);
         assert_eq!(picture.dimensions(), (40, 40));
         assert!(
@@ -547,10 +547,10 @@ fn photons_in_media_have_the_same_light_by_every_estimate() {
         mean(&picture, [0.0, 1.0], [0.0, 1.0])
     });
     // But for noise and blur, of which balls lose most by walls.
-    for other in [march, beams] {
+    for other in [march, beams, planes] {
         for channel in 0..3 {
             let ratio = other[channel] / ray[channel];
-            assert!((ratio - 1.0).abs() < 0.1, "{march:?} {ray:?} {beams:?}");
+            assert!((ratio - 1.0).abs() < 0.1, "{march:?} {ray:?} {beams:?} {planes:?}");
         }
     }
     // The same frames again are the same picture.
@@ -582,7 +582,7 @@ fn the_lamp_in_the_fog_goes_around_and_keys_change_the_estimate() {
     for expected in ["ray, ", "kernels a ray", "medians of 2 frames", "photons/s"] {
         assert!(text.contains(expected), "no {expected:?} in {text}");
     }
-    for (volume, keys, expected) in [("march", "ee", "beams, "), ("beams", "E", "march, ")] {
+    for (volume, keys, expected) in [("march", "ee", "beams, "), ("beams", "E", "planes, ")] {
         let (_, text) = shown(&["--volume", volume, "--keys", keys, "--frames", "2"]);
         assert!(text.contains(expected), "{text}");
     }

@@ -136,6 +136,26 @@ void main() {
         out1(8u, line_profile(in_bits(20u), in1(21u)));
         break;
     }
+    case 9u: {  // planes
+        uvec4 q0;
+        uvec4 q1;
+        uvec4 q2;
+        pack_plane(PhotonPlane(in3(0u), in3(3u), in3(6u), in3(9u), in_bits(12u), in_bits(13u)), q0, q1, q2);
+        PhotonPlane p = unpack_plane(q0, q1, q2);
+        out_bits(0u, q0.w);
+        out_bits(1u, q1.w);
+        out_bits(2u, is_plane(q2) ? 1u : 0u);
+        out_bits(3u, p.medium);
+        out_bits(4u, p.bounce);
+        out3(5u, p.first);
+        PlaneMeeting at = meet_plane(in3(14u), in3(17u), p.start, p.first, p.second);
+        out1(8u, at.t);
+        out1(9u, at.along.x);
+        out1(10u, at.along.y);
+        out1(11u, at.volume);
+        out1(12u, least_extinction(in3(20u)));
+        break;
+    }
     case 7u: {  // footprints in media
         Differentials d = Differentials(in3(0u), in3(3u), in3(6u), in3(9u));
         EventKernelSettings s = EventKernelSettings(in1(12u), in1(13u), in1(14u), in1(15u), in1(16u));

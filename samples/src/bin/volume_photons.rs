@@ -1,17 +1,18 @@
 //! Photons in participating media: a window on a scene whose light moves, seen by one estimate after the other, or one picture.
 //!
-//! `volume_photons [SCENE] [--volume march|ray|beams] [--photons N] [--radius METRES] [--turn DEGREES] [--flight METRES]` and the viewer's options, or without a
+//! `volume_photons [SCENE] [--volume march|ray|beams|planes] [--photons N] [--radius METRES] [--turn DEGREES] [--flight METRES]` and the viewer's options, or without a
 //! window `volume_photons [SCENE] --picture FILE [--frames N] [--size WxH]` and these
 //!
 //! Each frame the light goes around the middle of the scene by `--turn`, its photons collide in media and land on surfaces, maps of both are built, and
 //! rays from the eye find direct light, single scattering included, and in the maps everything else. E goes on to the next estimate of what is seen in media: marched
-//! under balls, by disks across each ray, and in homogeneous media by beams, the photons' whole ways. Space holds what moves, and the picture converges.
+//! under balls, by disks across each ray, and in homogeneous media by beams, the photons' whole ways, or by planes that two flights span. Space holds what moves, and the picture converges.
 //! `--flight` moves the camera as in the photon viewer, `--radius` is that of kernels in media; without it small pictures choose it, once where things move.
 //! With `--picture` nothing moves unless it is told to, and the last of `--frames` frames is written.
 //!
 //! Sources: H. W. Jensen and P. H. Christensen, "Efficient Simulation of Light Transport in Scenes with Participating Media Using Photon Maps", SIGGRAPH 1998; W. Jarosz, M.
 //! Zwicker and H. W. Jensen, "The Beam Radiance Estimate for Volumetric Photon Mapping", CGF 27(2), 2008; W. Jarosz, D. Nowrouzezahrai, I. Sadeghi and H. W.
-//! Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon Points and Beams", ACM TOG 30(1), 2011.
+//! Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon Points and Beams", ACM TOG 30(1), 2011; B. Bitterli and W. Jarosz, "Beyond Points and
+//! Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", ACM TOG 36(4), 2017.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -38,7 +39,12 @@ const TURN: f64 = 3.0;
 const SIZE: [u32; 2] = [256, 256];
 const FRAMES: u32 = 32;
 /// In the order of the key.
-const ESTIMATES: [VolumeEstimate; 3] = [VolumeEstimate::March, VolumeEstimate::Ray, VolumeEstimate::Beams];
+const ESTIMATES: [VolumeEstimate; 4] = [
+    VolumeEstimate::March,
+    VolumeEstimate::Ray,
+    VolumeEstimate::Beams,
+    VolumeEstimate::Planes,
+];
 
 fn main() -> ExitCode {
     clerestory_samples::report(run())
@@ -117,6 +123,7 @@ impl VolumePhotons {
             VolumeEstimate::March => "march",
             VolumeEstimate::Ray => "ray",
             VolumeEstimate::Beams => "beams",
+            VolumeEstimate::Planes => "planes",
         };
         let Some((counts, radius)) = self.0.counts() else {
             return name.into();

@@ -1,10 +1,12 @@
 #version 460
-// Radiance from the volume map along eye paths' ways through media: beams of photons, each counting where the ray passes it; or events, by the beam estimate, each event whose kernel the ray pierces counting at its closest point; or the
+// Radiance from the volume map along eye paths' ways through media: beams of photons, each counting where the ray passes it, and planes, where the ray meets them; or events, by the beam estimate, each event whose kernel the ray pierces counting at its closest point; or the
 // marched estimate, kernels of space at places of the ray that lie as far apart as they are wide, the first one by chance. Also what the medium leaves of light from the
 // surface that the path has met, for the surface's query behind it.
 //
 // L = sum_j K(d_j / h_j) / h_j^2 tau(t_j) p(w_j, -v) Phi_j, with Phi_j the flux that the event scatters: the corrected units of the source, where the albedo stands
 // instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam.
+// Of planes L = sum_j tau(t_j) sigma_s^2 p(w_j', -v) tau_j' Phi_j / |v . (w_j x w_j')| with the directions w_j and w_j' of both flights, and tau_j' what is left there of other
+// bands than the one that flights end as in: without blur. One of those that a ray meets has a ray that tells whether it is seen (photon_plane_ray.glsl).
 // Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Transmittances are exact in homogeneous media. In a grid one delta tracking a ray finds how far light of each band comes; what lies before counts in
 // full, what lies behind does not: unbiased. One that its quota stops goes on in a later dispatch, before anything is asked. Events count in their own medium alone.
 //
@@ -13,7 +15,7 @@
 //
 // PM-VOL-5, PM-VOL-7: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.2.4 and 7.1; W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate
 // for Volumetric Photon Mapping", 2008; W. Jarosz, D. Nowrouzezahrai, I. Sadeghi and H. W. Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon
-// Points and Beams", 2011. Deterministic in (seed, pixel, sample) and the map.
+// Points and Beams", 2011; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", 2017. Deterministic in (seed, pixel, sample) and the map.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -24,12 +26,14 @@ layout(local_size_x = 64) in;
 #include "techniques/photon_mapping/photon_event.glsl"
 #include "techniques/photon_mapping/photon_features.glsl"
 #include "techniques/photon_mapping/photon_eye.glsl"
+#include "techniques/photon_mapping/photon_plane_ray.glsl"
 #include "accel/sphere.glsl"
 
 layout(constant_id = 42) const uint PROFILE = KERNEL_EPANECHNIKOV;
 layout(constant_id = 43) const bool LINEAR = false;  // goes through records, for places that have stopped
 layout(constant_id = 47) const bool MARCHES = false;
 layout(constant_id = 55) const bool BEAMS = false;   // the map holds ways of photons
+layout(constant_id = 56) const bool PLANES = false;  // and planes
 
 layout(set = 1, binding = 0) uniform utextureBuffer event_pairs;
 layout(set = 1, binding = 1) uniform utextureBuffer event_records;
@@ -39,9 +43,13 @@ layout(set = 1, binding = 3, scalar) restrict buffer BeamCounters {
 } beam_counters;
 layout(set = 1, binding = 4, scalar) restrict buffer PhotonBeamWays { BeamWay beam_ways[]; };    // by place
 layout(set = 1, binding = 5, scalar) restrict buffer PhotonBeamAsked { float beam_asked[]; };    // by slot; of scenes with grids
+// Of maps with planes; elsewhere some other buffer is bound, and nothing is read or written. Rays of earlier bounces have ended.
+layout(set = 1, binding = 6, scalar) restrict buffer PhotonPlaneRays { PlaneRay plane_rays[]; };
 
 uvec4 compact_quarter(uint index) { return texelFetch(event_pairs, int(index)); }
-uvec4 event_quarter(uint record, uint quarter) { return texelFetch(event_records, int(EVENT_QUARTERS * record + quarter)); }
+uvec4 event_quarter(uint record, uint quarter) {
+    return texelFetch(event_records, int((PLANES ? PLANE_QUARTERS : EVENT_QUARTERS) * record + quarter));
+}
 bool compact_visit_beam(uint record);
 
 #define COMPACT_BEAM
@@ -58,6 +66,7 @@ layout(push_constant, scalar) uniform Push {
     uint most_bounces;
     float scale;         // of stored fluxes
     float radius;        // of beams
+    float plane_weight;  // of planes' fluxes, beside the scale
     uint first_place;    // of LINEAR
     uint first;          // of the records that a linear query goes through
     uint last;
@@ -72,6 +81,7 @@ layout(push_constant, scalar) uniform Push {
 
 // Stands for the round in the key of the random numbers, so that those of ways and shadow rays do not return.
 const uint BEAM_KEY = 0x20000000u;
+const uint PLANE_CHOICE_KEY = 0x10000000u;
 // Places of a march within a kernel, at most: it is twice as wide as they lie apart.
 const uint MARCH_PLACES = 3u;
 
@@ -88,10 +98,13 @@ struct Beam {
     uint classes;   // of photons that count, a bit each, where there are classes
     uint bounce;    // scatterings between the event and the eye
     float offset;   // of the places of a march, in their distance
+    uvec4 choice;   // key of the choice among planes
+    vec3 weight;    // of the light of planes, on its way to the picture
 };
 Beam beam;
 vec3 gathered;
 uint gathered_events;
+PlaneRay chosen;  // among the planes so far
 
 // What the medium leaves of light at a distance.
 vec3 passed_to(float t) {
@@ -143,9 +156,56 @@ void add_beam(uvec4 q0, uvec4 q1) {
     }
 }
 
+// Lets a plane's light count where the ray meets it, and its ray stand for all of them with the probability of its share.
+void add_plane(uint record, PhotonPlane p) {
+    uint bounces = p.bounce + 1u + beam.bounce;
+    bool counts = p.medium == beam.medium;
+    if (HAS_CLASSES) {
+        counts = counts && (beam.classes >> p.bounce & 1u) != 0u;
+    }
+    if (COUNTS_BOUNCES) {
+        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
+    }
+    if (!counts) {
+        return;
+    }
+    PlaneMeeting at = meet_plane(beam.origin, beam.direction, p.start, p.first, p.second);
+    bool inside = all(greaterThanEqual(at.along, vec2(0.0))) && all(lessThan(at.along, vec2(1.0)));
+    if (!(at.volume > 0.0) || !inside || !(at.t > beam.from && at.t < beam.to)) {
+        return;
+    }
+    vec2 lengths = vec2(length(p.first), length(p.second));
+    vec3 way = p.second / lengths.y;
+    vec3 left = relative_transmittance(beam.m.sigma_t, least_extinction(beam.m.sigma_t), dot(at.along, lengths));
+    float weight = lengths.x * lengths.y / at.volume * phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+    vec3 light = weight * beam.m.sigma_s * beam.m.sigma_s * passed_to(at.t) * left * p.flux;
+    float all_bands = light.x + light.y + light.z;
+    if (!(all_bands > 0.0 && all_bands < FAR_AWAY)) {
+        return;
+    }
+    ++gathered_events;
+    float variate = -log(1.0 - unit_float(pcg4d(beam.choice + uvec4(record, 0u, 0u, 0u)).w)) / all_bands;
+    chosen.total += all_bands;
+    if (chosen.resume == PLANE_RAY_ENDED || variate < chosen.variate) {
+        chosen.origin = beam.origin + at.t * beam.direction;
+        chosen.reach = at.along.y * lengths.y;
+        chosen.direction = -way;
+        chosen.resume = PLANE_RAY_BEGINS;
+        chosen.color = beam.weight * light / all_bands;
+        chosen.variate = variate;
+    }
+}
+
 bool compact_visit_beam(uint record) {
     uvec4 q0 = event_quarter(record, 0u);
     uvec4 q1 = event_quarter(record, 1u);
+    if (PLANES) {
+        uvec4 q2 = event_quarter(record, 2u);
+        if (is_plane(q2)) {
+            add_plane(record, unpack_plane(q0, q1, q2));
+            return !event_ends_leaf(q0);
+        }
+    }
     if (BEAMS) {
         add_beam(q0, q1);
         return !event_ends_leaf(q0);
@@ -317,6 +377,15 @@ void main() {
         uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), BEAM_KEY + walk_round(slot), push.key.seed);
         beam.offset = unit_float(pcg4d(key).w);
     }
+    if (PLANES) {
+        beam.choice = pcg4d(uvec4(walk_sequence(slot), walk_index(slot), PLANE_CHOICE_KEY + walk_round(slot), push.key.seed));
+        beam.weight = path.throughput * (push.scale * push.plane_weight);
+        chosen.resume = PLANE_RAY_ENDED;
+        chosen.total = 0.0;
+        if (LINEAR && push.first > 0u) {
+            chosen = plane_rays[place];
+        }
+    }
     gathered = vec3(0.0);
     gathered_events = 0u;
     bool complete = true;
@@ -340,5 +409,9 @@ void main() {
         atomicAdd(beam_counters.queries, 1u);
     }
     COUNT_WIDE(beam_counters.events, gathered_events)
+    // Of a query that goes through records also that there is none, for the records to come.
+    if (PLANES && (LINEAR || chosen.total > 0.0)) {
+        plane_rays[place] = chosen;
+    }
     walk_gathered[slot].radiance += path.throughput * gathered * push.scale;
 }

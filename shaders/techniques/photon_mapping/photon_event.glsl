@@ -1,4 +1,4 @@
-// A photon where it has collided with a medium: the record of a volume map, and the kernels of its estimates.
+// A photon where it has collided with a medium: the record of a volume map, and the kernels of its estimates; or its way there, or two of its flights.
 //
 // The flux is that which the collision scatters, so that a query has no albedo to multiply by: sigma_s over the density of the collision is in it for each
 // band. PM-VOL-7, PM-VOL-5: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.2.4 and 7.1; after W. Jarosz, M. Zwicker and H. W. Jensen, "The
@@ -7,10 +7,13 @@
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_EVENT_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_EVENT_GLSL
 
+#include "accel/ray.glsl"
 #include "techniques/photon_mapping/kernel.glsl"
 #include "techniques/photon_mapping/photon_history.glsl"
 
 const uint EVENT_QUARTERS = 2u;
+// Of all records of a map that has planes.
+const uint PLANE_QUARTERS = 3u;
 // In the word of the medium: last record of a leaf.
 const uint EVENT_LEAF_END = 0x80000000u;
 const uint EVENT_MEDIUM_MASK = 0x00FFFFFFu;
@@ -71,6 +74,53 @@ void pack_beam(PhotonBeam b, out uvec4 q0, out uvec4 q1) {
 PhotonBeam unpack_beam(uvec4 q0, uvec4 q1) {
     uint bounce = q0.w >> BEAM_BOUNCE_SHIFT & PHOTON_BOUNCE_MAX;
     return PhotonBeam(uintBitsToFloat(q0.xyz), uintBitsToFloat(q1.xyz), unpack_rgb9e5(q1.w), q0.w & EVENT_MEDIUM_MASK, bounce);
+}
+
+// Two flights of a photon through a homogeneous medium, as far as it has come on each: it may have been scattered anywhere on the first one, into the second. The first two
+// quarters are those of a beam along the first flight; the third one has the second flight, and is zero in a beam's record.
+struct PhotonPlane {
+    vec3 start;
+    vec3 first;
+    vec3 second;
+    vec3 flux;    // at its start, as stored
+    uint medium;
+    uint bounce;  // scatterings before, with that between the flights
+};
+
+void pack_plane(PhotonPlane p, out uvec4 q0, out uvec4 q1, out uvec4 q2) {
+    pack_beam(PhotonBeam(p.start, p.start + p.first, p.flux, p.medium, p.bounce), q0, q1);
+    q2 = uvec4(floatBitsToUint(p.second), 0u);
+}
+
+PhotonPlane unpack_plane(uvec4 q0, uvec4 q1, uvec4 q2) {
+    PhotonBeam b = unpack_beam(q0, q1);
+    return PhotonPlane(b.start, b.end - b.start, uintBitsToFloat(q2.xyz), b.flux, b.medium, b.bounce);
+}
+
+bool is_plane(uvec4 q2) { return uintBitsToFloat(q2.xyz) != vec3(0.0); }
+
+// Extinction of the band through which light comes farthest, of those with any.
+float least_extinction(vec3 sigma_t) {
+    vec3 extinction = mix(sigma_t, vec3(FAR_AWAY), equal(sigma_t, vec3(0.0)));
+    return min(extinction.x, min(extinction.y, extinction.z));
+}
+
+// Where a ray meets the plane that two flights span.
+struct PlaneMeeting {
+    float t;       // along the ray
+    vec2 along;    // shares of the flights
+    float volume;  // of the box that the ray's direction spans with them, m2; 0 where the ray lies in the plane, and nothing else is known
+};
+
+PlaneMeeting meet_plane(vec3 origin, vec3 direction, vec3 start, vec3 first, vec3 second) {
+    vec3 across = cross(first, second);
+    float volume = dot(direction, across);
+    if (!(abs(volume) > 0.0)) {
+        return PlaneMeeting(0.0, vec2(-1.0), 0.0);
+    }
+    vec3 delta = origin - start;
+    vec2 along = vec2(dot(delta, cross(second, direction)), dot(delta, cross(direction, first))) / volume;
+    return PlaneMeeting(-dot(delta, across) / volume, along, abs(volume));
 }
 
 // Kernels of one dimension, of the squared distance in units of the radius: over a radius on both sides they integrate to one.

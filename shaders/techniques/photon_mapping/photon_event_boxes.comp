@@ -1,5 +1,5 @@
 #version 460
-// First stage of a volume map: the boxes of events' kernels, and the exact bounds of their doubled centres. Twin of
+// First stage of a volume map: the boxes of events' kernels and of planes, and the exact bounds of their doubled centres. Twin of
 // clerestory::techniques::photon_mapping::volume::event::event_box, to the bit.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -14,6 +14,7 @@ layout(set = 0, binding = 1, scalar) restrict writeonly buffer LbvhBoxes { ivec4
 layout(set = 0, binding = 2, scalar) restrict buffer LbvhStateBlock { LbvhState lbvh_state; };
 
 layout(constant_id = 0) const bool BEAMS = false;  // records are pieces of ways
+layout(constant_id = 1) const bool PLANES = false;  // or planes, too
 
 layout(push_constant, scalar) uniform PhotonEventBoxesPush {
     uint count;
@@ -33,6 +34,15 @@ LbvhBox event_box(vec3 a, vec3 b, float radius) {
     return LbvhBox(ordered_integers(lower), ordered_integers(upper));
 }
 
+// From the ends of its first flight those of a plane's box.
+void plane_corners(vec3 second, inout vec3 a, inout vec3 b) {
+    precise vec3 c = a + second;
+    precise vec3 d = b + second;
+    vec3 lower = min(min(a, b), min(c, d));
+    b = max(max(a, b), max(c, d));
+    a = lower;
+}
+
 void main() {
     uint lane = gl_LocalInvocationID.x;
     if (lane < 3u) {
@@ -43,9 +53,19 @@ void main() {
     uint place = gl_WorkGroupID.x * LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION + lane;
     LbvhBox centres = LbvhBox(ivec3(0x7FFFFFFF), ivec3(int(0x80000000u)));
     for (uint i = 0u; i < LBVH_BOXES_PER_INVOCATION && place < event_push.count; ++i) {
-        vec3 from = uintBitsToFloat(texelFetch(event_records_in, int(EVENT_QUARTERS * place)).xyz);
-        uvec4 q1 = texelFetch(event_records_in, int(EVENT_QUARTERS * place + 1u));
-        LbvhBox box = event_box(from, BEAMS ? uintBitsToFloat(q1.xyz) : from, BEAMS ? event_push.radius : uintBitsToFloat(q1.y));
+        uint quarter = (PLANES ? PLANE_QUARTERS : EVENT_QUARTERS) * place;
+        vec3 from = uintBitsToFloat(texelFetch(event_records_in, int(quarter)).xyz);
+        uvec4 q1 = texelFetch(event_records_in, int(quarter + 1u));
+        vec3 to = BEAMS ? uintBitsToFloat(q1.xyz) : from;
+        float radius = BEAMS ? event_push.radius : uintBitsToFloat(q1.y);
+        if (PLANES) {
+            uvec4 q2 = texelFetch(event_records_in, int(quarter + 2u));
+            if (is_plane(q2)) {
+                plane_corners(uintBitsToFloat(q2.xyz), from, to);
+                radius = 0.0;
+            }
+        }
+        LbvhBox box = event_box(from, to, radius);
         lbvh_boxes[LBVH_BOX_QUARTERS * place] = ivec4(box.lower, box.upper.x);
         lbvh_boxes[LBVH_BOX_QUARTERS * place + 1u] = ivec4(box.upper.yz, 0, 0);
         precise vec3 doubled = ordered_floats(box.lower) + ordered_floats(box.upper);

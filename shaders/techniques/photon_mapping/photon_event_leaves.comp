@@ -14,6 +14,8 @@ layout(set = 0, binding = 1) uniform utextureBuffer map_order;
 layout(set = 0, binding = 2) uniform utextureBuffer map_retained;
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer EventMapRecords { uvec4 event_records_out[]; };
 
+layout(constant_id = 0) const bool PLANES = false;  // records may be planes
+
 layout(push_constant, scalar) uniform PhotonEventLeavesPush { uint count; } event_push;
 
 void main() {
@@ -21,10 +23,13 @@ void main() {
     if (place >= event_push.count) {
         return;
     }
-    uint from = EVENT_QUARTERS * texelFetch(map_order, int(place >> 2))[place & 3u];
+    uint quarters = PLANES ? PLANE_QUARTERS : EVENT_QUARTERS;
+    uint from = quarters * texelFetch(map_order, int(place >> 2))[place & 3u];
     bool ends = place + 1u == event_push.count || texelFetch(map_retained, int(place)).x != 0u;
     uvec4 first = texelFetch(event_records_in, int(from));
     first.w |= ends ? EVENT_LEAF_END : 0u;
-    event_records_out[EVENT_QUARTERS * place] = first;
-    event_records_out[EVENT_QUARTERS * place + 1u] = texelFetch(event_records_in, int(from + 1u));
+    event_records_out[quarters * place] = first;
+    for (uint i = 1u; i < quarters; ++i) {
+        event_records_out[quarters * place + i] = texelFetch(event_records_in, int(from + i));
+    }
 }

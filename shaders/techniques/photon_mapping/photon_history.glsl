@@ -13,6 +13,12 @@ const uint PHOTON_CLASSES = 15u;
 // both.
 const uint FLAG_VOLUME = 16u;
 const uint FLAG_LANDED = 32u;
+// Two flights wait there, where planes are stored.
+const uint FLAG_PLANE = 64u;
+
+// Stand for the density of directions in a photon's walk: whether its way begins at a collision with the medium that it goes through.
+const float PHOTON_FROM_COLLISION = 1.0;
+const float PHOTON_FROM_ELSEWHERE = 0.0;
 
 // In the word of the normal: the photon has been scattered diffusely, or in a medium.
 const uint PHOTON_DIFFUSED_BIT = 0x40000000u;

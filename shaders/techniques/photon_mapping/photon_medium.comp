@@ -34,6 +34,7 @@ layout(push_constant, scalar) uniform Push {
     float piece;         // about how long pieces of ways are, m
     uint pieces_most;    // of a way
     uint classes[2];     // successors of each class of photons by scattering in a medium
+    float plane_share;   // of ways that have planes
     float path_share;    // of kernels' radii over the mean free path of their medium at its densest, at most; 0 for any
     EventKernelSettings kernel;  // without footprints all have the greatest radius
 } push;
@@ -47,6 +48,8 @@ layout(push_constant, scalar) uniform Push {
 
 // Optical depth beyond which what is left of a way is not stored: a ten millionth of its light.
 const float WAY_DEPTH = 16.0;
+// Stands for the round in the key of the random numbers of planes.
+const uint PLANE_KEY = 0x80000000u;
 // Of PATH_SET_STATE_BITS each.
 const uint CLASSES_PER_WORD = 8u;
 
@@ -67,8 +70,7 @@ float radius_in(SceneMedium m, float radius) {
 // Stores the photon's way through a homogeneous medium, `reach` long.
 uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
     uint bounce = path_set_bounce(photon.bounce);
-    vec3 extinction = mix(m.sigma_t, vec3(FAR_AWAY), equal(m.sigma_t, vec3(0.0)));
-    reach = min(reach, WAY_DEPTH / min(extinction.x, min(extinction.y, extinction.z)));
+    reach = min(reach, WAY_DEPTH / least_extinction(m.sigma_t));
     uint pieces = uint(clamp(ceil(reach / push.piece), 1.0, float(push.pieces_most)));
     atomicAdd(photon_medium_counters.events, pieces);
     PhotonWay way;
@@ -82,6 +84,52 @@ uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedi
     way.pieces = pieces;
     photon_ways[place] = way;
     return FLAG_WAITING | FLAG_VOLUME;
+}
+
+// State of a photon after a scattering in a medium; PATH_SET_DEAD where no picture has that.
+uint state_after(uint state) {
+    if (HAS_CLASSES) {
+        return push.classes[state / CLASSES_PER_WORD] >> (PATH_SET_STATE_BITS * (state % CLASSES_PER_WORD)) & PATH_SET_DEAD;
+    }
+    return PHOTON_DIFFUSED;
+}
+
+// Distance of a flight through a homogeneous medium; the probability to come farther is a transmittance.
+float flight(float extinction, uint bits) { return -log(1.0 - unit_float(bits)) / extinction; }
+
+// Stores the photon's flight along its way, `reach` long, and one into a direction that it may be scattered in, however far the photon itself comes. Both end by chance, as
+// in the band that comes farthest: what other bands have less of is a query's.
+uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
+    uint history = path_set_bounce(photon.bounce) + 1u;
+    if (HAS_CLASSES) {
+        history = state_after(path_set_state(photon.bounce));
+    }
+    uvec4 flights = pcg4d(uvec4(walk_sequence(slot), walk_index(slot), PLANE_KEY + walk_round(slot), push.key.seed));
+    uvec4 turn = pcg4d(flights);
+    if (HAS_CLASSES && history == PATH_SET_DEAD || !(unit_float(turn.x) < push.plane_share)) {
+        return 0u;
+    }
+    float extinction = least_extinction(m.sigma_t);
+    float c = phase_function_sample(m.phase, m.phase_parameter, unit_float(turn.y));
+    PhotonPlane plane;
+    plane.start = photon.origin + start * photon.direction;
+    plane.first = min(reach, flight(extinction, flights.x)) * photon.direction;
+    plane.second = flight(extinction, flights.y) * normalize(phase_direction(photon.direction, c, unit_float(turn.z)));
+    plane.flux = dithered_flux(photon.throughput * push.flux_scale, slot, path_set_bounce(photon.bounce));
+    plane.medium = medium;
+    plane.bounce = history;
+    uvec4 q0;
+    uvec4 q1;
+    uvec4 q2;
+    pack_plane(plane, q0, q1, q2);
+    if (!is_plane(q2)) {
+        return 0u;
+    }
+    atomicAdd(photon_medium_counters.events, 1u);
+    photon_planes[PLANE_QUARTERS * place] = q0;
+    photon_planes[PLANE_QUARTERS * place + 1u] = q1;
+    photon_planes[PLANE_QUARTERS * place + 2u] = q2;
+    return FLAG_WAITING | FLAG_PLANE;
 }
 
 // Stores a collision at `at`, after which the photon has the flux that is scattered.
@@ -103,13 +151,9 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
     if (bounce >= push.last_bounce) {
         return false;
     }
-    uint after = PHOTON_DIFFUSED;
-    if (HAS_CLASSES) {
-        uint history = path_set_state(photon.bounce);
-        after = push.classes[history / CLASSES_PER_WORD] >> (PATH_SET_STATE_BITS * (history % CLASSES_PER_WORD)) & PATH_SET_DEAD;
-        if (after == PATH_SET_DEAD) {
-            return false;
-        }
+    uint after = state_after(path_set_state(photon.bounce));
+    if (HAS_CLASSES && after == PATH_SET_DEAD) {
+        return false;
     }
     float survival = walk_survival(before, photon.throughput, bounce);
     // Also ends a photon whose flux is not a number.
@@ -126,6 +170,7 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
     photon.direction = wi;
     photon.origin = at;
     photon.throughput /= survival;
+    photon.pdf = PHOTON_FROM_COLLISION;
     photon.bounce = path_set_joined(bounce + 1u, after);
     return true;
 }
@@ -169,9 +214,17 @@ void main() {
         m = load_medium(medium);
         bool passes = m.sigma_s == vec3(0.0);
         uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
-        if (STORES_WAYS && !passes && photon.throughput != vec3(0.0) && path_set_bounce(photon.bounce) >= push.first_deposit) {
+        if (STORES_WAYS && !passes && photon.throughput != vec3(0.0)) {
             float begin = max(state.start, 0.0);
-            flags = deposit_way(slot, place, photon, medium, m, begin, end >= FAR_AWAY ? FAR_AWAY : end - begin);
+            float reach = end >= FAR_AWAY ? FAR_AWAY : end - begin;
+            // What comes of a way that begins at a collision is that of the plane of the way before.
+            bool in_plane = STORES_PLANES && photon.pdf == PHOTON_FROM_COLLISION;
+            if (path_set_bounce(photon.bounce) >= push.first_deposit && !in_plane) {
+                flags = deposit_way(slot, place, photon, medium, m, begin, reach);
+            }
+            if (STORES_PLANES && path_set_bounce(photon.bounce) < push.last_bounce) {
+                flags |= deposit_plane(slot, place, photon, medium, m, begin, reach);
+            }
         }
         if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
             float t_max = end >= FAR_AWAY ? FAR_AWAY : end - state.start;
@@ -243,6 +296,7 @@ void main() {
         alive = photon.throughput != vec3(0.0);
     } else if (crossing.boundary) {
         state.start = past_surface(hit.t);
+        photon.pdf = PHOTON_FROM_ELSEWHERE;
         interior = crossing.beyond;
         alive = photon.throughput != vec3(0.0);
     } else {

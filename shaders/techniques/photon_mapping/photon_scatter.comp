@@ -207,6 +207,9 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     photon.throughput = flux / survival;
     photon.origin = departure(a, wi, photon.throughput);
     photon.direction = normalize(wi);
+    if (HAS_MEDIA) {
+        photon.pdf = PHOTON_FROM_ELSEWHERE;
+    }
     photon.bounce = path_set_joined(bounce + 1u, diffused);
     store_walk(slot, photon, HAS_MEDIA ? -way_left_out(s, photon.origin, photon.direction) : 0.0);
     return true;
@@ -226,8 +229,8 @@ void main() {
             return;
         }
         photon.throughput *= event.weight;
-        // A way that is stored.
-        flags = event.flags & (FLAG_WAITING | FLAG_VOLUME);
+        // A way that is stored, or a plane.
+        flags = event.flags & (FLAG_WAITING | FLAG_VOLUME | FLAG_PLANE);
     }
     if (scatter(slot, place, photon, flags)) {
         flags |= FLAG_ALIVE;

@@ -25,9 +25,26 @@ void append_way(uint place, uint event, uint pieces) {
         uvec4 q1;
         pack_beam(PhotonBeam(way.start + from * way.direction, way.start + to * way.direction, way.flux * exp(-way.sigma_t * from), way.medium, way.bounce),
                   q0, q1);
-        photon_volume_records[EVENT_QUARTERS * (event + i)] = q0;
-        photon_volume_records[EVENT_QUARTERS * (event + i) + 1u] = q1;
+        uint quarter = volume_quarters() * (event + i);
+        photon_volume_records[quarter] = q0;
+        photon_volume_records[quarter + 1u] = q1;
+        if (STORES_PLANES) {
+            photon_volume_records[quarter + 2u] = uvec4(0u);
+        }
     }
+}
+
+// Two flights become a plane, behind the beams of the same place; the records that come before.
+uint append_plane(uint place, uint event, uint records) {
+    uint flags = texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL];
+    if ((flags & FLAG_PLANE) == 0u) {
+        return records;
+    }
+    uint last = event + records - 1u;
+    for (uint i = 0u; last < push.event_capacity && i < PLANE_QUARTERS; ++i) {
+        photon_volume_records[PLANE_QUARTERS * last + i] = photon_planes[PLANE_QUARTERS * place + i];
+    }
+    return records - 1u;
 }
 
 void main() {
@@ -45,7 +62,7 @@ void main() {
     uint source = WAITING_QUARTERS * place;
     uint event = push.first_event + before + rank;
     if (STORES_WAYS) {
-        append_way(place, event, in_medium);
+        append_way(place, event, STORES_PLANES ? append_plane(place, event, in_medium) : in_medium);
         // Ranks of surfaces go over the wave's earlier bounces as those of media do.
         uint landed = photon_landed_flags[waiting];
         uint landed_rank = photon_landed_ranks[waiting];

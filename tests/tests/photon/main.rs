@@ -16,6 +16,7 @@ mod lights;
 mod maps;
 mod materials;
 mod neighbours;
+mod planes;
 mod queues;
 mod scale;
 mod settings;

@@ -546,7 +546,7 @@ fn kernels_shrink_as_the_theory_says() {
 fn hosts_and_devices_build_the_same_maps_of_media() {
     with_gpu(|gpu| {
         let scene = lit_box(medium(4.0, 0.9, Phase::Isotropic));
-        for volume in [VolumeEstimate::Ray, VolumeEstimate::Beams] {
+        for volume in [VolumeEstimate::Ray, VolumeEstimate::Beams, VolumeEstimate::Planes] {
             let of = |map_build| {
                 let settings = PhotonSettings {
                     map_build,
@@ -648,13 +648,15 @@ fn what_photons_cannot_bring_through_media_is_refused() {
         glowing.media[0].emission = Vec3::ONE;
         let error = refuse(&glowing, settings("all"));
         assert!(error.to_string().contains("emits everywhere"), "{error}");
-        let beams = PhotonSettings {
-            volume: VolumeEstimate::Beams,
-            ..settings("all")
-        };
-        match refuse(&lit_box(uneven(medium(1.0, 0.5, Phase::Isotropic))), beams) {
-            Error::Setting { name, .. } => assert_eq!(name, "volume"),
-            other => panic!("{other}"),
+        for (volume, word) in [(VolumeEstimate::Beams, "beams"), (VolumeEstimate::Planes, "planes")] {
+            let ways = PhotonSettings {
+                volume,
+                ..settings("all")
+            };
+            match refuse(&lit_box(uneven(medium(1.0, 0.5, Phase::Isotropic))), ways) {
+                Error::Setting { name, value, .. } => assert_eq!((name.as_ref(), value.as_ref()), ("volume", word)),
+                other => panic!("{other}"),
+            }
         }
         let mut sky = endless(medium(1.0, 0.5, Phase::Isotropic));
         sky.environment = Some(Environment::uniform(Vec3::ONE));
@@ -682,11 +684,13 @@ fn hashed_picture(gpu: &Gpu) -> Vec<f32> {
     };
     let mut all = photons(gpu, &lit_box(uneven(coloured.clone())), &settings, 2);
     all.extend(photons(gpu, &lit_box(coloured.clone()), &settings, 2));
-    let beams = PhotonSettings {
-        volume: VolumeEstimate::Beams,
-        ..settings
-    };
-    all.extend(photons(gpu, &lit_box(coloured), &beams, 2));
+    for volume in [VolumeEstimate::Beams, VolumeEstimate::Planes] {
+        let ways = PhotonSettings {
+            volume,
+            ..settings.clone()
+        };
+        all.extend(photons(gpu, &lit_box(coloured.clone()), &ways, 2));
+    }
     all
 }
 

@@ -14,6 +14,9 @@ use clerestory::techniques::photon_mapping::volume::event::{
 use clerestory::techniques::photon_mapping::volume::footprint::{
     EventKernelSettings, event_radius, footprint_across, log_of_one_plus, passed_differentials, scattered_in_medium,
 };
+use clerestory::techniques::photon_mapping::volume::plane::{
+    PhotonPlane, is_plane, least_extinction, meet_plane, pack_plane, unpack_plane,
+};
 use clerestory::transport::differentials::{
     Differentials, area_light_differentials, camera_differentials, diffuse_reemission, emission_differentials,
     guard_differentials, normal_derivatives, parallel_beam_differentials, reflect_differentials, refract_differentials,
@@ -635,6 +638,67 @@ fn beams_agree_with_their_twins() {
                 "{:?}",
                 case.0
             );
+        }
+    });
+}
+
+#[test]
+fn planes_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(41, |r| {
+            let color = r.magnitude(-12, 8) * Vec3::new(r.unit(), r.unit(), r.unit());
+            // Clear of rays in the plane, where the product cancels.
+            let [ray, first, second] = loop {
+                let [ray, first, second] = [0; 3].map(|_| direction(r));
+                if ray.dot(first.cross(second)).abs() > 0.1 {
+                    break [ray, r.range(0.5, 2.0) * first, r.range(0.5, 2.0) * second];
+                }
+            };
+            // Every fourth one is a beam.
+            let second = if r.below(4) == 0 { Vec3::ZERO } else { second };
+            let rest = [code(r.below(1 << 20)), code(r.below(80))];
+            let mut all = list32(&[4.0 * r.vector(), first, second, color], &rest);
+            let extinctions = [0; 3].map(|_| r.choose(&[0.0, 0.5, 1.0, 3.0]));
+            all.extend(list32(&[4.0 * r.vector(), ray, Vec3::from_array(extinctions)], &[]));
+            all
+        });
+        let results = twin_photons(gpu, 9, &table, &[]);
+        for (case, result) in table.iter().zip(&results) {
+            let at = |i: usize| Vec3::from_slice(&case.0[i..]);
+            let x = case.0.map(f64::from);
+            let plane = PhotonPlane {
+                start: at(0),
+                first: at(3),
+                second: at(6),
+                flux: at(9),
+                medium: case.0[12].to_bits(),
+                bounce: case.0[13].to_bits(),
+            };
+            let words = pack_plane(&plane);
+            assert_eq!([result.bits(0), result.bits(1)], [words[0][3], words[1][3]]);
+            assert_eq!(result.bits(2), u32::from(is_plane(&words)));
+            let back = unpack_plane(&words);
+            assert_eq!([result.bits(3), result.bits(4)], [back.medium, back.bounce]);
+            assert_eq!(Vec3::from_slice(&result.0[5..]), back.first);
+            let least = least_extinction(v3(&x, 20));
+            assert!(
+                result.0[12] == least as f32 || least.is_infinite() && result.0[12] > 1e38,
+                "{least}"
+            );
+            if !is_plane(&words) {
+                assert_eq!(result.0[11], 0.0);
+                continue;
+            }
+            let [start, first, second] = [back.start, back.first, back.second].map(|v| v.as_dvec3());
+            let met = meet_plane(v3(&x, 14), v3(&x, 17), start, first, second);
+            // Products of lengths up to some metres over a volume of at least a fortieth.
+            let near = |i: usize, value: f64| (f64::from(result.0[i]) - value).abs() <= 4e4 * U;
+            assert!(
+                near(8, met.t) && near(9, met.along[0]) && near(10, met.along[1]),
+                "{:?}",
+                case.0
+            );
+            assert!((f64::from(result.0[11]) - met.volume).abs() <= 64.0 * U, "{:?}", case.0);
         }
     });
 }

@@ -32,6 +32,9 @@ const NEAREST_SEARCHES: u32 = NEAREST_ROUNDS + NEAREST_HALVINGS;
 /// Records that a submission takes at all of its places, where no hierarchy helps: a fraction of a second on devices that a driver watches.
 const LINEAR_RECORDS: u64 = 1 << 28;
 
+/// First part that goes through the records of surfaces at stopped places, in scenes whose map of media has planes: sweeps over the rays of these come before, however many.
+const PARTS_BEHIND_SWEEPS: u64 = 1 << 40;
+
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[non_exhaustive]
@@ -90,6 +93,15 @@ pub(super) struct GatherStage<'a> {
     radius: f32,
     /// Of the volume map, in scenes with media.
     beam: Option<BeamStage<'a>>,
+}
+
+/// A map of media, as its queries need it.
+pub(super) struct EventsAsked<'a> {
+    pub map: &'a EventMap,
+    /// Of beams, m.
+    pub radius: f64,
+    /// Share of ways that have planes.
+    pub plane_share: f64,
 }
 
 type Counters = photon_gather::GatherCounters;
@@ -196,20 +208,21 @@ impl Gather {
     }
 
     /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
-    /// of the map of events there, whose beams have a radius, m.
+    /// of the map of events there.
     pub fn stage<'a>(
         &'a self,
         scene: &'a GpuScene,
         map: &'a PhotonMap,
-        events: Option<(&'a EventMap, f64)>,
+        events: Option<EventsAsked<'a>>,
         scale: f64,
         (neighbors, radius): (u32, f64),
     ) -> GatherStage<'a> {
-        let beam = self.beam.as_ref().zip(events).map(|(beam, (map, radius))| BeamStage {
+        let beam = self.beam.as_ref().zip(events).map(|(beam, events)| BeamStage {
             beam,
-            map,
+            map: events.map,
             scale: scale as f32,
-            radius: radius as f32,
+            radius: events.radius as f32,
+            plane_share: events.plane_share as f32,
         });
         GatherStage {
             beam,
@@ -284,6 +297,11 @@ impl ArrivalStage for GatherStage<'_> {
         if let Some(beam) = &self.beam {
             recorder.pass("photon: beams", |pass| beam.record(pass, self.scene, wave, places))?;
         }
+        if let Some(beam) = self.beam.as_ref().filter(|beam| beam.has_plane_rays()) {
+            recorder.pass("photon: plane rays", |pass| {
+                beam.record_plane_rays(pass, self.scene, wave, places)
+            })?;
+        }
         let mut groups = places.items;
         if !matches!(gather.queue, Queue::Slots) {
             recorder.pass("photon: gather queue", |pass| {
@@ -352,6 +370,17 @@ impl ArrivalStage for GatherStage<'_> {
             })?;
             return Ok(Some(part));
         }
+        let mut first_part = of_beams;
+        if let Some(beam) = self.beam.as_ref().filter(|beam| beam.has_plane_rays()) {
+            first_part = PARTS_BEHIND_SWEEPS;
+            let sweep = part - of_beams;
+            if part < first_part && (sweep == 0 || beam.plane_rays_remain()?) {
+                recorder.pass("photon: plane rays all", |pass| {
+                    beam.record_plane_sweep(pass, self.scene, wave, stopped, sweep)
+                })?;
+                return Ok(Some(part + 1));
+            }
+        }
         let Linear::Records(_, made) = &gather.linear else {
             return Err(Error::Overflow {
                 kernel: "photon_gather".into(),
@@ -368,7 +397,7 @@ impl ArrivalStage for GatherStage<'_> {
         })?;
         let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
         let parts = LinearParts::new(gather.quota, self.map.count, stopped);
-        let (mut part, mut taken) = (part - of_beams, 0);
+        let (mut part, mut taken) = (part.saturating_sub(first_part), 0);
         recorder.pass("photon: gather all", |pass| {
             while part < parts.count() && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {
                 let [first, last] = parts.records(part);
@@ -386,7 +415,7 @@ impl ArrivalStage for GatherStage<'_> {
             }
             Ok(())
         })?;
-        Ok((part < parts.count()).then_some(of_beams + part))
+        Ok((part < parts.count()).then_some(first_part + part))
     }
 }
 

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::card::refusals;
-use super::gather::{Gather, GatherCounts};
+use super::gather::{EventsAsked, Gather, GatherCounts};
 use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
 use super::pilot;
@@ -161,7 +161,7 @@ impl PhotonMapper {
         let has_media = scene.profile().media.any();
         if has_media && settings.stores_ways() && scene.profile().media.heterogeneous {
             let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\" or \"march\"";
-            return Err(Error::setting("volume", "beams", cause));
+            return Err(Error::setting("volume", settings.volume.word(), cause));
         }
         let (classes, eye_paths) = (settings.classes()?, settings.eye_paths(has_media)?);
         let eye_settings = PathTracerSettings {
@@ -177,8 +177,8 @@ impl PhotonMapper {
         let has_map = settings.needs_photons() && sends_photons(&scene);
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            let (plan, ways) = (settings.plan(has_media), settings.stores_ways());
-            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), ways)
+            let (plan, estimate) = (settings.plan(has_media), settings.volume);
+            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), estimate)
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
@@ -299,6 +299,7 @@ impl PhotonMapper {
         let mut timings = Vec::new();
         let (kernel, watts, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
         let (path_share, shrunk) = (self.event_path_share(pass), self.settings.event_shrinkage(pass));
+        let plane_share = self.plane_share();
         if let Some(photons) = &mut self.photons
             && photons.map.is_none()
         {
@@ -309,6 +310,7 @@ impl PhotonMapper {
                     .tracer
                     .begin(pass, Some(&kernel))
                     .with_event_kernel(event_kernel, path_share)
+                    .with_plane_share(plane_share)
             };
             let mut tracing = begun.unwrap_or_else(begin);
             let all = photons.tracer.advance(&mut tracing)?;
@@ -365,7 +367,11 @@ impl PhotonMapper {
                 Some(gather.stage(
                     &self.scene,
                     map,
-                    events.as_ref().map(|map| (map, event_kernel.length_max)),
+                    events.as_ref().map(|map| EventsAsked {
+                        map,
+                        radius: event_kernel.length_max,
+                        plane_share,
+                    }),
                     watts,
                     nearest,
                 ))
@@ -427,7 +433,7 @@ impl PhotonMapper {
     }
 
     /// Traces the photons of a pass, and returns their collisions with media that are stored, in the order of waves, in each of bounces and photons. The picture is
-    /// not touched, and counts go on. With [`VolumeEstimate::Beams`](super::volume::VolumeEstimate::Beams) there are none.
+    /// not touched, and counts go on. With [`VolumeEstimate::Beams`](super::volume::VolumeEstimate::Beams) and planes there are none.
     ///
     /// # Errors
     /// As [`PhotonMapper::step`].
@@ -492,6 +498,15 @@ impl PhotonMapper {
 
     fn event_path_share(&self, pass: u32) -> f64 {
         self.settings.event_path_share(pass, &self.media_lengths())
+    }
+
+    /// Of ways that have planes, where these are stored: as many less as beams are narrower.
+    fn plane_share(&self) -> f64 {
+        if self.settings.radius_is_automatic() {
+            self.event_share
+        } else {
+            1.0
+        }
     }
 
     fn media_lengths(&self) -> MediaLengths {

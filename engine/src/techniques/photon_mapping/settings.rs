@@ -129,15 +129,15 @@ crate::settings! {
         pub reduction: f32 = 2.0 / 3.0, in AboveTo(0.0, 1.0);
         /// Eye paths per pixel that query the same map.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
-        /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or whole ways, in
-        /// homogeneous media alone.
+        /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or, in homogeneous
+        /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
         /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.
         ///
         /// 0 stands for the radius of fixed kernels under which rays meet some tens of them, which a small picture of few photons finds out, at most a fiftieth of the scene's diagonal
-        /// and in each medium a quarter of its mean free path; and for a ninth of the diagonal for others.
+        /// and in each medium a quarter of its mean free path; and for a ninth of the diagonal for others. Where there are planes so many less ways have one; with a radius all have.
         pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
         /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
@@ -182,7 +182,10 @@ crate::settings! {
 impl PhotonSettings {
     fn fits_together(&self) -> Result<()> {
         if self.stores_ways() && self.volume_kernel != VolumeKernel::Fixed {
-            let cause = "cannot be combined with \"volume\": \"beams\", which have one radius: take \"fixed\"";
+            let cause = format!(
+                "cannot be combined with \"volume\": \"{}\", whose beams have one radius: take \"fixed\"",
+                self.volume.word()
+            );
             return Err(Error::setting("volume_kernel", self.volume_kernel.word(), cause));
         }
         if self.direct_photons && self.final_gather {
@@ -299,7 +302,7 @@ impl PhotonSettings {
 
     /// Whether the ways of photons through media are stored, instead of their collisions.
     pub(super) fn stores_ways(&self) -> bool {
-        self.volume == VolumeEstimate::Beams
+        self.volume.stores_ways()
     }
 
     /// Kernels of events in media in a pass.

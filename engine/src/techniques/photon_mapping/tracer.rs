@@ -15,7 +15,7 @@ use super::glow::GlowStage;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
 use super::volume::footprint::EventKernelSettings;
-use super::volume::{Room, VolumeOptions, VolumePass, VolumeTrace};
+use super::volume::{Room, VolumeEstimate, VolumeOptions, VolumePass, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
@@ -201,6 +201,8 @@ pub(in crate::techniques) struct Tracing {
     event_kernel: Option<EventKernelSettings>,
     /// [`VolumePass::path_share`].
     path_share: f64,
+    /// [`VolumePass::plane_share`].
+    plane_share: f64,
     /// First photon of the wave under way, or of the next one.
     first_photon: u32,
     wave: Option<(WalkKey, WaveInFlight)>,
@@ -220,6 +222,11 @@ impl Tracing {
             path_share,
             ..self
         }
+    }
+
+    /// With planes of that share of ways.
+    pub fn with_plane_share(self, plane_share: f64) -> Self {
+        Self { plane_share, ..self }
     }
 
     /// What has been traced.
@@ -270,25 +277,26 @@ struct PhotonStages<'a> {
     kernel: Option<&'a KernelSettings>,
     event_kernel: Option<&'a EventKernelSettings>,
     path_share: f64,
+    plane_share: f64,
 }
 
 impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
-        Self::in_media(gpu, scene, plan, append, None, false)
+        Self::in_media(gpu, scene, plan, append, None, VolumeEstimate::Ray)
     }
 
-    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep the ways instead of the collisions.
+    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep what an estimate sees.
     pub(super) fn in_media(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
         plan: PhotonPlan,
         append: Box<dyn Append>,
         classes: Option<&PathClasses>,
-        stores_ways: bool,
+        estimate: VolumeEstimate,
     ) -> Result<Self> {
         let media = VolumeOptions {
             has_classes: classes.is_some(),
-            stores_ways,
+            estimate,
         };
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let has_differentials = plan.follows_footprints;
@@ -420,6 +428,7 @@ impl PhotonTracer {
             kernel: kernel.copied(),
             event_kernel: None,
             path_share: 0.0,
+            plane_share: 1.0,
             first_photon: 0,
             wave: None,
             traced: Traced::default(),
@@ -453,6 +462,7 @@ impl PhotonTracer {
             kernel: tracing.kernel.as_ref(),
             event_kernel: tracing.event_kernel.as_ref(),
             path_share: tracing.path_share,
+            plane_share: tracing.plane_share,
         };
         self.walker.advance(wave, &mut stages)?;
         tracing.traced.timings.append(&mut wave.take_timings());
@@ -594,6 +604,7 @@ impl WalkStages for PhotonStages<'_> {
                 classes: kit.classes.as_ref().map_or([0; 2], |(_, in_media)| *in_media),
                 kernel: self.event_kernel.copied(),
                 path_share: self.path_share as f32,
+                plane_share: self.plane_share as f32,
             };
             recorder.pass("photon: medium", |pass| {
                 volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)

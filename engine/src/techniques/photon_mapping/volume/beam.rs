@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use super::VolumeEstimate;
 use super::map::EventMap;
+use super::plane_rays::PlaneRays;
 use crate::gpu::shaders::constants::{LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::techniques::photon_mapping::photon_beam;
@@ -13,7 +14,7 @@ use crate::techniques::photon_mapping::gather::GatherCounts;
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
 use crate::techniques::photon_mapping::settings::PhotonSettings;
 use crate::transport::{GpuScene, PathSet};
-use crate::walk::{Places, WalkKey, stage_barrier};
+use crate::walk::{Places, StoppedPlaces, WalkKey, stage_barrier};
 use crate::{Error, Result};
 
 /// Nodes and events of a query, at most: beside a walk through a grid, its loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
@@ -29,6 +30,8 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     linear: (Box<photon_beam::Spec>, OnceLock<ComputePipeline<photon_beam::Kernel>>),
     ways: Buffer,
     asked: Buffer,
+    /// Only where the map has planes.
+    planes: Option<PlaneRays>,
     counters: Buffer,
     counters_readback: Buffer,
     /// Of eye paths that ask at all, and that ask in media, a bit each.
@@ -47,6 +50,8 @@ pub(in crate::techniques::photon_mapping) struct BeamStage<'a> {
     pub scale: f32,
     /// Of beams, m.
     pub radius: f32,
+    /// Share of ways that have planes.
+    pub plane_share: f32,
 }
 
 /// Which eye paths ask, and for what.
@@ -89,7 +94,8 @@ impl Beam {
             sampler_kind: settings.sampler as u32,
             profile: settings.profile as u32,
             marches: settings.volume == VolumeEstimate::March,
-            beams: settings.volume == VolumeEstimate::Beams,
+            beams: settings.volume.stores_ways(),
+            planes: settings.volume.stores_planes(),
             compact_quota: settings.query_quota.min(BEAM_QUOTA),
             counts_bounces,
             has_classes: classes.is_some(),
@@ -116,6 +122,10 @@ impl Beam {
             linear: (Box::new(spec(true)), OnceLock::new()),
             ways: work("beam ways", size_of::<BeamWay>(), slots)?,
             asked: work("beam asked", size_of::<f32>(), asked)?,
+            planes: match settings.volume.stores_planes() {
+                true => Some(PlaneRays::new(gpu, scene, slots)?),
+                false => None,
+            },
             counters: work("beam counters", bytes as usize, 1)?,
             counters_readback: gpu.buffer(&BufferDesc::readback("beam counters", bytes))?,
             states: surface_states | volume_states,
@@ -129,7 +139,8 @@ impl Beam {
     }
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        vec![self.kernel.info()]
+        let planes = self.planes.iter().map(PlaneRays::pipeline);
+        std::iter::once(self.kernel.info()).chain(planes).collect()
     }
 
     /// What is left of light from the surfaces that paths have met, by place.
@@ -156,6 +167,11 @@ impl BeamStage<'_> {
             beam_counters: self.beam.counters.view(),
             photon_beam_ways: self.beam.ways.view(),
             photon_beam_asked: self.beam.asked.view(),
+            photon_plane_rays: self
+                .beam
+                .planes
+                .as_ref()
+                .map_or(self.beam.counters.view(), PlaneRays::rays),
         }
     }
 
@@ -169,12 +185,14 @@ impl BeamStage<'_> {
             most_bounces: self.beam.bounces[1],
             scale: self.scale,
             radius: self.radius,
+            plane_weight: 1.0 / self.plane_share,
             classes: self.beam.classes,
             ..Default::default()
         }
     }
 
     pub fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
+        self.beam.planes.as_ref().map_or(Ok(()), |planes| planes.reset(pass))?;
         pass.update(self.beam.counters.view(), &[Counters::default()])
     }
 
@@ -189,6 +207,41 @@ impl BeamStage<'_> {
         pass.dispatch_indirect(&self.beam.kernel, &[wave, &set, &of_scene, &media], &push, places.items)?;
         stage_barrier(pass);
         Ok(())
+    }
+
+    /// Whether eye paths send rays along the flights of planes.
+    pub fn has_plane_rays(&self) -> bool {
+        self.beam.planes.is_some()
+    }
+
+    /// Records these rays, behind queries.
+    pub fn record_plane_rays(
+        &self,
+        pass: &mut Pass<'_>,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        places: Places<'_>,
+    ) -> Result<()> {
+        let planes = self.beam.planes.as_ref();
+        planes.map_or(Ok(()), |planes| planes.record(pass, scene, wave, places))
+    }
+
+    /// Whether a sweep over the rays of stopped places has left some that are not at their ends.
+    pub fn plane_rays_remain(&self) -> Result<bool> {
+        self.beam.planes.as_ref().map_or(Ok(false), PlaneRays::remain)
+    }
+
+    /// Records a sweep over these.
+    pub fn record_plane_sweep(
+        &self,
+        pass: &mut Pass<'_>,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        stopped: StoppedPlaces,
+        sweep: u64,
+    ) -> Result<()> {
+        let planes = self.beam.planes.as_ref();
+        planes.map_or(Ok(()), |planes| planes.record_sweep(pass, scene, wave, stopped, sweep))
     }
 
     pub fn prepare_stopped(&self) -> Result<()> {

@@ -4,10 +4,11 @@
 //!
 //! Guarantees: a ray's query visits every kernel that it pierces; the same bytes on any number of threads, by host and device.
 
-use super::VolumeKernel;
 use super::event::{EventWords, MEDIUM_WORD, event_box, set_event_radius, unpack_beam, unpack_event};
 use super::footprint::EventKernelSettings;
 use super::neighbor::{NEIGHBORS, neighbor_radii};
+use super::plane::plane_corners;
+use super::{VolumeEstimate, VolumeKernel};
 use crate::accel::Aabb;
 use crate::accel::lbvh::SortedCodes;
 use crate::accel::morton::MORTON_30_AXIS_BITS;
@@ -16,14 +17,13 @@ use crate::accel::photon_map::complete_bvh::CompleteBvh;
 use crate::accel::photon_map::device::{MapBuffers, MapBuilder};
 use crate::accel::photon_map::merge::merged_hierarchy;
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{
-    COMPACT_NOTHING, EVENT_LEAF_END, EVENT_QUARTERS, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE,
-};
+use crate::gpu::shaders::constants::{COMPACT_NOTHING, EVENT_LEAF_END, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_event_boxes, photon_event_leaves};
 use crate::gpu::shaders::types::CompactRoot;
 use crate::gpu::{Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Submission, TexelView};
 use crate::techniques::photon_mapping::settings::{MapBuild, PhotonSettings};
 use crate::{Error, Result};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Events of a leaf, at most, where their codes tell them apart.
@@ -46,8 +46,8 @@ pub(in crate::techniques::photon_mapping) struct EventMaps {
     device: Option<DeviceEventMaps>,
     /// Of the device: more events than it can, or memory has room for, go to the host.
     or_host: bool,
-    /// Records are pieces of ways.
-    beams: bool,
+    /// What records are.
+    estimate: VolumeEstimate,
     /// Kernels are as wide as neighbours are far, which the host finds.
     by_neighbors: bool,
 }
@@ -57,29 +57,33 @@ struct DeviceEventMaps {
     boxes: ComputePipeline<photon_event_boxes::Kernel>,
     leaves: ComputePipeline<photon_event_leaves::Kernel>,
     memory: Option<(MapBuffers, TexelView)>,
+    /// Of a record.
+    quarters: u32,
 }
 
 impl EventMaps {
     /// # Errors
     /// As [`Gpu::compute_pipeline`].
     pub fn new(gpu: &Gpu, settings: &PhotonSettings) -> Result<Self> {
-        let (build, beams) = (settings.map_build, settings.stores_ways());
+        let (build, estimate) = (settings.map_build, settings.volume);
+        let (beams, planes) = (estimate.stores_ways(), estimate.stores_planes());
         let by_neighbors = settings.volume_kernel == VolumeKernel::Neighbor;
         let device = match build {
             _ if by_neighbors => None,
             MapBuild::Host => None,
             MapBuild::Auto | MapBuild::Device => Some(DeviceEventMaps {
                 builder: MapBuilder::new(gpu)?,
-                boxes: gpu.compute_pipeline(&photon_event_boxes::Spec { beams })?,
-                leaves: gpu.compute_pipeline(&Default::default())?,
+                boxes: gpu.compute_pipeline(&photon_event_boxes::Spec { beams, planes })?,
+                leaves: gpu.compute_pipeline(&photon_event_leaves::Spec { planes })?,
                 memory: None,
+                quarters: estimate.quarters(),
             }),
         };
         Ok(Self {
             gpu: gpu.clone(),
             device,
             or_host: build == MapBuild::Auto,
-            beams,
+            estimate,
             by_neighbors,
         })
     }
@@ -111,11 +115,16 @@ impl EventMaps {
                 built => return built.map(|(map, submission)| (map, Some(submission))),
             }
         }
+        if self.estimate.stores_ways() {
+            let quarters = count as usize * self.estimate.quarters() as usize;
+            let words: Vec<[u32; 4]> = self.gpu.read(events.buffer().view(), quarters)?;
+            return Ok((self.by_host(&words, radius)?, None));
+        }
         let words = self.read(events, count, kernel, shrunk)?;
-        Ok((self.by_host(&words, radius)?, None))
+        Ok((self.by_host(words.as_flattened(), radius)?, None))
     }
 
-    /// The first `count` of `events`, with their kernels.
+    /// The first `count` of `events`, which are collisions, with their kernels.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::DeviceLost`], [`Error::LimitExceeded`] for more events than neighbours can be found among.
@@ -138,18 +147,11 @@ impl EventMaps {
         Ok(words)
     }
 
-    fn by_host(&self, events: &[EventWords], radius: f32) -> Result<EventMap> {
-        let boxes: Vec<Aabb> = events
-            .par_iter()
-            .map(|words| {
-                if self.beams {
-                    let beam = unpack_beam(words);
-                    return event_box(beam.start, beam.end, radius);
-                }
-                let event = unpack_event(words);
-                event_box(event.position, event.position, event.radius)
-            })
-            .collect();
+    fn by_host(&self, words: &[[u32; 4]], radius: f32) -> Result<EventMap> {
+        let quarters = self.estimate.quarters() as usize;
+        let records = words.par_chunks_exact(quarters);
+        let estimate = self.estimate;
+        let boxes: Vec<Aabb> = records.map(|record| box_of(estimate, record, radius)).collect();
         let sorted = SortedCodes::of_boxes(&boxes, MORTON_30_AXIS_BITS);
         let complete = CompleteBvh::new(&merged_hierarchy(&boxes, &sorted, LEAF_SIZE, |_| {}))?;
         let compact = CompactBvh::encode(&complete).map_err(|fault| Error::Internal {
@@ -157,11 +159,16 @@ impl EventMaps {
             fault: format!("is not tight: {fault:?}"),
         })?;
         let leaves = complete.order.par_iter().zip(&complete.ends);
-        let ordered: Vec<EventWords> = leaves
-            .map(|(index, ends)| {
-                let mut words = events[*index as usize];
-                words[0][MEDIUM_WORD] |= if *ends { EVENT_LEAF_END } else { 0 };
-                words
+        let ordered: Vec<[u32; 4]> = leaves
+            .flat_map_iter(|(index, ends)| {
+                let first = *index as usize * quarters;
+                let ends = if *ends { EVENT_LEAF_END } else { 0 };
+                let record = words[first..first + quarters].iter().enumerate();
+                record.map(move |(quarter, word)| {
+                    let mut word = *word;
+                    word[MEDIUM_WORD] |= if quarter == 0 { ends } else { 0 };
+                    word
+                })
             })
             .collect();
         let root = CompactRoot {
@@ -178,9 +185,27 @@ impl EventMaps {
             root: self.gpu.buffer_with("volume map root", Category::Work, &[root])?,
             pairs: texels("volume map", bytemuck::cast_slice(&compact.pairs))?,
             events: texels("volume map events", bytemuck::cast_slice(&ordered))?,
-            count: events.len() as u32,
+            count: boxes.len() as u32,
         })
     }
+}
+
+/// The box of a record; that of a beam has a radius.
+fn box_of(estimate: VolumeEstimate, record: &[[u32; 4]], radius: f32) -> Aabb {
+    let words: EventWords = [record[0], record[1]];
+    if !estimate.stores_ways() {
+        let event = unpack_event(&words);
+        return event_box(event.position, event.position, event.radius);
+    }
+    let beam = unpack_beam(&words);
+    let second = record.get(2).map_or(Vec3::ZERO, |[x, y, z, _]| {
+        Vec3::from_array([*x, *y, *z].map(f32::from_bits))
+    });
+    if second != Vec3::ZERO {
+        let [low, high] = plane_corners(second, beam.start, beam.end);
+        return event_box(low, high, 0.0);
+    }
+    event_box(beam.start, beam.end, radius)
 }
 
 impl DeviceEventMaps {
@@ -241,7 +266,7 @@ impl DeviceEventMaps {
     }
 
     fn memory_of(&self, gpu: &Gpu, capacity: u32) -> Result<(MapBuffers, TexelView)> {
-        let texels = u64::from(capacity) * u64::from(EVENT_QUARTERS);
+        let texels = u64::from(capacity) * u64::from(self.quarters);
         let format = vk::Format::R32G32B32A32_UINT;
         Ok((
             self.builder.buffers(capacity)?,

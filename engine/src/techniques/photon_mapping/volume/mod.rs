@@ -3,16 +3,19 @@
 //! Sources: H. W. Jensen and P. H. Christensen, "Efficient Simulation of Light Transport in Scenes with Participating Media Using Photon Maps", SIGGRAPH 1998;
 //! W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate for Volumetric Photon Mapping", Computer Graphics Forum 27(2), 2008; B. Fabianowski,
 //! "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, chapter 7; C. Knaus and M. Zwicker, "Progressive Photon Mapping: A
-//! Probabilistic Approach", ACM TOG 30(3), 2011.
+//! Probabilistic Approach", ACM TOG 30(3), 2011; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light
+//! Transport", ACM TOG 36(4), 2017.
 //!
 //! Nothing of it is made for scenes without media. Bias: kernels blur, and lose the light of media by walls and boundaries as far as they reach, since there are
-//! no events beyond; a thin wall lets them through. Both fade as kernels shrink.
+//! no events beyond; a thin wall lets them through. Both fade as kernels shrink. Planes have none: what they carry is unbiased, the rest comes by beams.
 
 mod beam;
 pub mod event;
 pub mod footprint;
 mod map;
 pub mod neighbor;
+pub mod plane;
+mod plane_rays;
 mod trace;
 
 pub(super) use beam::{Beam, BeamAsk, BeamStage};
@@ -20,6 +23,7 @@ pub(super) use map::{EventMap, EventMaps};
 pub(super) use trace::{Room, VolumeOptions, VolumePass, VolumeTrace};
 
 use crate::catalogue::{Bias, Role, Row, sources};
+use crate::gpu::shaders::constants::{EVENT_QUARTERS, PLANE_QUARTERS};
 
 /// How events are seen along eye paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -29,6 +33,8 @@ pub enum VolumeEstimate {
     Ray,
     /// Beams: ways of photons through homogeneous media as far as the next surface, each seen where the ray passes it.
     Beams,
+    /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else.
+    Planes,
     /// Balls at places of the ray that lie as far apart as they are wide, from a first one by chance.
     March,
 }
@@ -37,9 +43,39 @@ impl VolumeEstimate {
     /// Of its kernels.
     pub(super) fn dimensions(self) -> f64 {
         match self {
-            Self::Beams => 1.0,
+            // What planes leave is seen by beams.
+            Self::Beams | Self::Planes => 1.0,
             Self::Ray => 2.0,
             Self::March => 3.0,
+        }
+    }
+
+    /// Whether the ways of photons are stored, instead of their collisions.
+    pub(super) fn stores_ways(self) -> bool {
+        matches!(self, Self::Beams | Self::Planes)
+    }
+
+    /// And planes instead of those that begin at a collision.
+    pub(super) fn stores_planes(self) -> bool {
+        self == Self::Planes
+    }
+
+    /// Words of its records, over four.
+    fn quarters(self) -> u32 {
+        if self.stores_planes() {
+            PLANE_QUARTERS
+        } else {
+            EVENT_QUARTERS
+        }
+    }
+
+    /// As settings spell it.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Ray => "ray",
+            Self::Beams => "beams",
+            Self::Planes => "planes",
+            Self::March => "march",
         }
     }
 }
@@ -135,6 +171,37 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         settings: &["volume"],
         ..Row::of(file!())
+    },
+    Row {
+        id: "CL-PHOTON-PLANES",
+        name: "photon planes: two flights in a row through a medium, seen where a ray meets what they span, without kernels",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Homogeneous media alone, and only light scattered there twice at last with nothing in between, the rest by beams; short flights; a ray nearly in a plane is noise without bound; one ray along a flight stands for all planes of an eye path's way.",
+        sources: &[sources::BITTERLI_JAROSZ_2017.whole()],
+        bias: Some(Bias::Unbiased),
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_event.glsl",
+            "shaders/techniques/photon_mapping/photon_medium.comp",
+            "shaders/techniques/photon_mapping/photon_plane_ray.glsl",
+            "shaders/techniques/photon_mapping/photon_plane_rays.comp",
+        ],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/plane.rs::planes_come_back_and_their_boxes_hold_them",
+            "engine/src/techniques/photon_mapping/volume/plane.rs::rays_meet_planes_where_both_are",
+            "engine/src/techniques/photon_mapping/volume/plane.rs::planes_have_the_double_scattering_integral",
+            "tests/tests/photon/planes.rs::planes_have_the_exact_multiple_scattering",
+            "tests/tests/photon/planes.rs::planes_agree_with_the_path_tracer_without_blur",
+            "tests/tests/photon/planes.rs::planes_and_beams_have_every_path_once",
+            "tests/tests/photon/planes.rs::single_scattering_is_that_of_beams",
+            "tests/tests/photon/planes.rs::lengths_times_eight_give_a_sixty_fourth_by_planes",
+            "tests/tests/photon/planes.rs::planes_that_a_quota_stops_go_through_all_records",
+            "tests/tests/photon/planes.rs::what_is_chosen_alone_has_planes",
+            "tests/tests/photon/planes.rs::errors_of_planes_fall_with_the_root_of_passes",
+            "tests/tests/twins/photons.rs::planes_agree_with_their_twins",
+        ],
+        settings: &["volume"],
+        ..Row::of("engine/src/techniques/photon_mapping/volume/plane.rs")
     },
     Row {
         id: "PM-VOL-5",

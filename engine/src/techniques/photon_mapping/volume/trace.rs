@@ -3,11 +3,13 @@
 //! Stages: `photon_medium` before photons are scattered by surfaces, and in the place of what appends a surface's deposits `photon_volume_flags`, prefix sums and
 //! `photon_volume_append`.
 
+use super::VolumeEstimate;
 use super::event::{EventWords, MEDIUM_WORD};
 use super::footprint::EventKernelSettings;
+use super::plane::PlaneWords;
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, EVENT_QUARTERS, NO_MEDIUM};
+use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, NO_MEDIUM};
 use crate::gpu::shaders::sets::{PhotonVolumeSet, PhotonWave};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_medium, photon_volume_append, photon_volume_flags};
 use crate::gpu::shaders::types;
@@ -23,7 +25,7 @@ const EVENTS_PER_PHOTON: u64 = 4;
 /// Pieces that a way is stored in, at most: long ones have wide boxes. Fewer where a device cannot hold as many.
 const WAY_PIECES: u32 = 32;
 
-const _: () = assert!(MEDIUM_WORD < 4 && size_of::<EventWords>() <= 32);
+const _: () = assert!(MEDIUM_WORD < 4 && size_of::<EventWords>() <= 32 && size_of::<PlaneWords>() <= 48);
 
 /// What the stages are told beside the wave.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +42,8 @@ pub(in crate::techniques::photon_mapping) struct VolumePass {
     pub kernel: Option<EventKernelSettings>,
     /// Radius of kernels over the mean free path of their medium where it is densest, at most; 0 for any.
     pub path_share: f32,
+    /// Share of ways that have planes.
+    pub plane_share: f32,
 }
 
 /// What photons in media are specialized to.
@@ -47,8 +51,8 @@ pub(in crate::techniques::photon_mapping) struct VolumePass {
 pub(in crate::techniques::photon_mapping) struct VolumeOptions {
     /// The path set is an expression.
     pub has_classes: bool,
-    /// Ways are stored instead of collisions.
-    pub stores_ways: bool,
+    /// What is stored.
+    pub estimate: VolumeEstimate,
 }
 
 /// Where records of a wave begin, and how many there is room for.
@@ -75,6 +79,10 @@ pub(in crate::techniques::photon_mapping) struct VolumeTrace {
     scratch: Buffer,
     /// Only where ways are stored: flags and ranks of deposits on surfaces, and the ways by place.
     ways: Option<[Buffer; 3]>,
+    /// Only where planes are stored: those that wait, by place.
+    planes: Option<Buffer>,
+    /// Of a record.
+    quarters: u32,
     events: TexelView,
     capacity: u32,
     pieces_most: u32,
@@ -87,6 +95,8 @@ impl VolumeTrace {
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::LimitExceeded`] for media of numbers that records cannot hold.
     pub fn new(gpu: &Gpu, scene: &GpuScene, plan: &PhotonPlan, options: VolumeOptions, slots: u32) -> Result<Self> {
+        let (stores_ways, stores_planes) = (options.estimate.stores_ways(), options.estimate.stores_planes());
+        let quarters = options.estimate.quarters();
         let profile = scene.profile();
         let media = profile.media.count as u64;
         if media > u64::from(EVENT_MEDIUM_MASK) {
@@ -105,23 +115,33 @@ impl VolumeTrace {
             sampler_kind: plan.sampler as u32,
             has_differentials: plan.follows_footprints,
             has_classes: options.has_classes,
-            stores_ways: options.stores_ways,
+            stores_ways,
+            stores_planes,
             ..Default::default()
         };
         let work = |name: &str, bytes: u64| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
         let words = |name: &str| work(name, u64::from(slots) * size_of::<u32>() as u64);
         let scan = Scan::new(gpu, ScanOptions::default())?;
         let bytes = size_of::<Counters>() as u64;
-        let capacity = (u64::from(plan.photons) * EVENTS_PER_PHOTON).min(events_of_device(gpu)) as u32;
+        let capacity = (u64::from(plan.photons) * EVENTS_PER_PHOTON).min(events_of_device(gpu, quarters)) as u32;
         Ok(Self {
             medium: gpu.compute_pipeline(&medium)?,
             flags: gpu.compute_pipeline(&photon_volume_flags::Spec {
-                stores_ways: options.stores_ways,
+                stores_ways,
+                stores_planes,
             })?,
             append: gpu.compute_pipeline(&photon_volume_append::Spec {
-                stores_ways: options.stores_ways,
+                stores_ways,
+                stores_planes,
             })?,
-            ways: if options.stores_ways {
+            planes: match stores_planes {
+                true => Some(work(
+                    "photon planes",
+                    u64::from(slots) * size_of::<PlaneWords>() as u64,
+                )?),
+                false => None,
+            },
+            ways: if stores_ways {
                 let bytes = u64::from(slots) * size_of::<types::PhotonWay>() as u64;
                 Some([
                     words("photon landed flags")?,
@@ -141,7 +161,8 @@ impl VolumeTrace {
             flag_words: words("photon volume flags")?,
             ranks: words("photon volume ranks")?,
             scratch: work("photon volume scan", scan.scratch_bytes(slots))?,
-            events: event_texels(gpu, capacity)?,
+            events: event_texels(gpu, capacity, quarters)?,
+            quarters,
             capacity,
             pieces_most: WAY_PIECES,
             slots,
@@ -171,6 +192,7 @@ impl VolumeTrace {
             photon_landed_flags: of_ways(0),
             photon_landed_ranks: of_ways(1),
             photon_ways: of_ways(2),
+            photon_planes: self.planes.as_ref().unwrap_or(&self.counters).view(),
         }
     }
 
@@ -207,6 +229,7 @@ impl VolumeTrace {
             piece: told.piece,
             pieces_most: self.pieces_most,
             classes: told.classes,
+            plane_share: told.plane_share,
             path_share: told.path_share,
             kernel,
         };
@@ -289,7 +312,7 @@ impl VolumeTrace {
     /// # Errors
     /// [`Error::Overflow`] for more collisions or whole ways than the device can hold, [`Error::OutOfMemory`].
     pub fn grow(&mut self, gpu: &Gpu, needed: u32) -> Result<()> {
-        let most = events_of_device(gpu);
+        let most = events_of_device(gpu, self.quarters);
         let mut needed = needed;
         if u64::from(needed) > most && self.ways.is_some() && self.pieces_most > 1 {
             self.pieces_most /= 2;
@@ -305,20 +328,20 @@ impl VolumeTrace {
             });
         }
         let capacity = (u64::from(needed) + u64::from(needed / 4)).min(most) as u32;
-        self.events = event_texels(gpu, capacity)?;
+        self.events = event_texels(gpu, capacity, self.quarters)?;
         self.capacity = capacity;
         Ok(())
     }
 }
 
-/// Events that a buffer of the device can hold: 2²² where one has 128 MiB.
-fn events_of_device(gpu: &Gpu) -> u64 {
+/// Records of so many quarters that a buffer of the device can hold: 2²² of two where one has 128 MiB.
+fn events_of_device(gpu: &Gpu, of_record: u32) -> u64 {
     let caps = gpu.caps();
     let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
-    (quarters / u64::from(EVENT_QUARTERS)).min(u64::from(u32::MAX / 2))
+    (quarters / u64::from(of_record)).min(u64::from(u32::MAX / 2))
 }
 
-fn event_texels(gpu: &Gpu, events: u32) -> Result<TexelView> {
-    let texels = u64::from(events) * u64::from(EVENT_QUARTERS);
+fn event_texels(gpu: &Gpu, events: u32, of_record: u32) -> Result<TexelView> {
+    let texels = u64::from(events) * u64::from(of_record);
     gpu.storage_texels("photon events", Category::Work, vk::Format::R32G32B32A32_UINT, texels)
 }

@@ -1,0 +1,216 @@
+//! Photon planes: closed forms, the path tracer on the light paths that they alone carry, and what they share with beams.
+
+use super::volume::{airlight, endless, lit_box, single};
+use super::volume_truths::{exactly, parallel};
+use super::*;
+use clerestory::scene::{Medium, Phase};
+use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
+use clerestory_tests::render::{builtin, cuboid, medium};
+use clerestory_tests::with_gpu;
+use glam::DVec3;
+
+/// Light that is scattered in a medium twice at last, with no surface in between: that of planes alone.
+const OF_PLANES: &str = "L.*VVE";
+
+fn planes(set: &str, photons: u32) -> PhotonSettings {
+    PhotonSettings {
+        volume: VolumeEstimate::Planes,
+        // Of beams, which the light of planes has none of.
+        volume_radius: 0.3,
+        photons,
+        ..settings(set)
+    }
+}
+
+fn forward() -> Medium {
+    medium(2.0, 0.8, Phase::HenyeyGreenstein { g: 0.5 })
+}
+
+#[test]
+fn planes_have_the_exact_multiple_scattering() {
+    with_gpu(|gpu| {
+        // As by kernels (`volume_truths.rs`), without what those blur.
+        for (albedo, h, expected) in [(0.5, 0.5, 4.22674e-4), (0.9, 1.0, 2.27478e-3)] {
+            let mut scene = endless(medium(1.0, albedo, Phase::Isotropic));
+            scene.cameras = vec![parallel(DVec3::new(-3.0, h, 0.0), DVec3::X, 1e-6)];
+            let found = means(gpu, &scene, &planes("bounces=2..", 1 << 12), 24);
+            found.expect(&format!("albedo {albedo}, {h} m away"), 0, 0, exactly(expected), 0.0);
+            assert!(found.counts.beams.photons > 1000);
+        }
+    });
+}
+
+#[test]
+fn planes_agree_with_the_path_tracer_without_blur() {
+    with_gpu(|gpu| {
+        // Bands that come differently far.
+        let coloured = Medium {
+            sigma_s: Vec3::new(1.0, 2.0, 4.0),
+            sigma_a: Vec3::new(0.5, 0.2, 0.1),
+            phase: Phase::HenyeyGreenstein { g: 0.5 },
+            ..Medium::default()
+        };
+        // The sphere stands between many of the places of two flights.
+        for scene in [
+            lit_box(coloured),
+            builtin("builtin:fog-box?boxes=none"),
+            builtin("builtin:fog-box?sphere=glass&sigma_s=3"),
+        ] {
+            expect_agreement(gpu, &scene, &planes(OF_PLANES, 1 << 11), [24, 1024], [0.0; 3]);
+        }
+    });
+}
+
+#[test]
+fn planes_and_beams_have_every_path_once() {
+    with_gpu(|gpu| {
+        // Two boxes of the same medium: flights from one into the other are those of beams.
+        let mut scene = lit_box(forward());
+        let boundary = scene.meshes[1].material;
+        let (low, high) = (Vec3::new(0.55, -0.5, -0.5), Vec3::new(0.8, 0.2, 0.5));
+        scene.place(cuboid("second box", boundary.unwrap_or(0), low, high));
+        let reference = traced(gpu, &scene, "bounces=2..4", 1024);
+        for volume in [VolumeEstimate::Beams, VolumeEstimate::Planes] {
+            let settings = PhotonSettings {
+                volume,
+                volume_radius: 0.02,
+                radius: 0.1,
+                ..planes("bounces=2..4", 1 << 12)
+            };
+            let found = means(gpu, &scene, &settings, 16);
+            // As of beams in one box (`volume.rs`).
+            found.expect_same_as(&format!("{volume:?}"), &reference, [1.5e-2; 3]);
+            assert!(found.counts.beams.photons > 1000);
+        }
+    });
+}
+
+#[test]
+fn single_scattering_is_that_of_beams() {
+    with_gpu(|gpu| {
+        let scene = airlight(0.5, 2.0, 1.0);
+        let [beams, planes] = [VolumeEstimate::Beams, VolumeEstimate::Planes].map(|volume| {
+            let settings = PhotonSettings {
+                photons: 1 << 12,
+                ..single(volume, 0.05)
+            };
+            photons(gpu, &scene, &settings, 2)
+        });
+        assert!(beams[0] > 0.0);
+        assert_eq!(bits(&planes), bits(&beams));
+    });
+}
+
+#[test]
+fn lengths_times_eight_give_a_sixty_fourth_by_planes() {
+    with_gpu(|gpu| {
+        let of = |lengths: f32| {
+            let settings = PhotonSettings {
+                path_set: OF_PLANES.parse().unwrap_or_else(|error| panic!("{error}")),
+                photons: 1 << 12,
+                ..single(VolumeEstimate::Planes, 0.25 * lengths)
+            };
+            photons(gpu, &airlight(0.5, 2.0, lengths), &settings, 2)
+        };
+        let (truth, scaled) = (of(1.0), of(8.0));
+        assert!(truth[0] > 1e-4, "{}", truth[0]);
+        let back: Vec<f32> = scaled.iter().map(|value| value * 64.0).collect();
+        assert_eq!(bits(&back), bits(&truth));
+    });
+}
+
+#[test]
+fn planes_that_a_quota_stops_go_through_all_records() {
+    with_gpu(|gpu| {
+        let scene = builtin("builtin:fog-box?sphere=glass&sigma_s=3");
+        let of = |query_quota, submission_work| {
+            let settings = PhotonSettings {
+                query_quota,
+                submission_work,
+                ..planes(OF_PLANES, 1 << 9)
+            };
+            let mut mapper = mapper(gpu, &scene, &settings);
+            let picture = advance(&mut mapper, 2);
+            (picture, mapper.counts().beams, mapper.eye_counters().stalls)
+        };
+        let (whole, counts, stalls) = of(32_768, 0);
+        assert!(stalls == 0 && counts.photons > 1000);
+        // What is left for later, rays along flights among it, never shows.
+        assert_eq!(bits(&of(32_768, 1).0), bits(&whole));
+        let (stopped, stopped_counts, stalls) = of(64, 0);
+        assert!(stalls > 0);
+        assert_eq!(stopped_counts, counts);
+        // The same planes are chosen; sums of all of them in another order.
+        for (i, (a, b)) in whole.iter().zip(&stopped).enumerate() {
+            assert!((a - b).abs() <= 1e-5 * a, "{i}: {b}, not {a}");
+        }
+    });
+}
+
+#[test]
+fn what_is_chosen_alone_has_planes() {
+    with_gpu(|gpu| {
+        let names = |scene: &Scene, volume| -> Vec<&str> {
+            let settings = PhotonSettings {
+                volume,
+                ..settings("all")
+            };
+            let mapper = mapper(gpu, scene, &settings);
+            mapper.pipelines().iter().map(|pipeline| pipeline.shader).collect()
+        };
+        let has = |names: &[&str]| names.iter().any(|name| name.contains("photon_plane_rays"));
+        let fog = lit_box(forward());
+        assert!(has(&names(&fog, VolumeEstimate::Planes)));
+        assert!(!has(&names(&fog, VolumeEstimate::Beams)));
+        assert!(!has(&names(&builtin("builtin:cornell-box"), VolumeEstimate::Planes)));
+    });
+}
+
+/// Mean squared errors of means over 1 and over 16 of the passes of a rendering, beyond those of the truth itself.
+fn errors_of_passes(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, truth: &Rendered) -> [f64; 2] {
+    const PASSES: u32 = 128;
+    const GROUP: usize = 16;
+    let mut mapper = mapper(gpu, scene, settings);
+    let mut before = vec![0.0; truth.radiance.len()];
+    let passes: Vec<Vec<f64>> = (1..=PASSES)
+        .map(|pass| {
+            let so_far = advance(&mut mapper, pass).into_iter();
+            let so_far: Vec<f64> = so_far.map(|value| f64::from(value) * f64::from(pass)).collect();
+            let own = so_far.iter().zip(&before).map(|(now, before)| now - before).collect();
+            before = so_far;
+            own
+        })
+        .collect();
+    let own_error: f64 = truth.variance.iter().map(|variance| f64::from(*variance)).sum();
+    [1, GROUP].map(|group| {
+        let groups = passes.chunks_exact(group);
+        let count = groups.len() as f64;
+        let squared = groups.map(|passes| {
+            let mean = |i: usize| passes.iter().map(|pass| pass[i]).sum::<f64>() / group as f64;
+            let errors = (0..before.len()).map(|i| (mean(i) - f64::from(truth.radiance[i])).powi(2));
+            errors.sum::<f64>() - own_error
+        });
+        squared.sum::<f64>() / count
+    })
+}
+
+#[test]
+fn errors_of_planes_fall_with_the_root_of_passes() {
+    with_gpu(|gpu| {
+        let scene = lit_box(medium(2.0, 0.8, Phase::Isotropic));
+        let truth = traced(gpu, &scene, OF_PLANES, 4096);
+        let slope = |volume| {
+            let settings = PhotonSettings {
+                volume,
+                ..planes(OF_PLANES, 1 << 10)
+            };
+            let [one, sixteen] = errors_of_passes(gpu, &scene, &settings, &truth);
+            let slope = 0.5 * (sixteen / one).ln() / 16f64.ln();
+            println!("{volume:?}: MSE {one:.4e} of a pass, {sixteen:.4e} of sixteen, slope {slope:.4} of RMSE");
+            slope
+        };
+        // Where nothing shrinks, blur stays.
+        assert!((slope(VolumeEstimate::Planes) + 0.5).abs() < 0.1);
+        assert!(slope(VolumeEstimate::Beams) > -0.4);
+    });
+}
