@@ -3,6 +3,6 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
-#include "raster/vertex_main.glsl"
+#include "raster/weighted_vertex.glsl"
 
-void main() { raster_vertex(uint(gl_InstanceIndex)); }
+void main() { raster_weighted_vertex(uint(gl_InstanceIndex)); }

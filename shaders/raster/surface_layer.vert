@@ -4,9 +4,9 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_ARB_shader_viewport_layer_array : require
 
-#include "raster/vertex_main.glsl"
+#include "raster/weighted_vertex.glsl"
 
 void main() {
-    raster_vertex(uint(gl_InstanceIndex));
+    raster_weighted_vertex(uint(gl_InstanceIndex));
     gl_Layer = gl_InstanceIndex;
 }

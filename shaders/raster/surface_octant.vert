@@ -4,10 +4,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
-#include "raster/vertex_main.glsl"
+#include "raster/weighted_vertex.glsl"
 
 void main() {
-    vec3 p = raster_vertex(uint(gl_InstanceIndex));
+    vec3 p = raster_weighted_vertex(uint(gl_InstanceIndex));
     precise vec3 inside = raster_views[raster_view].signs * p;
     gl_ClipDistance[0] = inside.x;
     gl_ClipDistance[1] = inside.y;

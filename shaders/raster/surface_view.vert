@@ -4,6 +4,6 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_multiview : require
 
-#include "raster/vertex_main.glsl"
+#include "raster/weighted_vertex.glsl"
 
-void main() { raster_vertex(uint(gl_ViewIndex)); }
+void main() { raster_weighted_vertex(uint(gl_ViewIndex)); }

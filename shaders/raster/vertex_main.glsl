@@ -6,7 +6,6 @@
 
 layout(location = 0) flat out uint raster_triangle;
 layout(location = 1) flat out uint raster_view;
-layout(location = 2) out vec2 raster_weights;
 
 // Returns the vertex from the view's origin.
 vec3 raster_vertex(uint number) {
@@ -14,7 +13,6 @@ vec3 raster_vertex(uint number) {
     raster_triangle = uint(gl_VertexIndex) / 3u;
     RasterView view = raster_views[raster_view];
     uint corner = uint(gl_VertexIndex) % 3u;
-    raster_weights = raster_corner_weights(corner);
     vec3 p;
     bool is_somewhere = raster_corner(view, raster_triangle, corner, p);
     gl_Position = is_somewhere ? raster_project(view, p) : vec4(0.0, 0.0, RASTER_NOWHERE, 1.0);

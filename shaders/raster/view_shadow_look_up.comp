@@ -44,12 +44,15 @@ float visibility(ShadowQuery q) {
     ivec2 first = ivec2(floor(low));
     vec2 part = low - floor(low);
     float sum = 0.0;
+    float weights = 0.0;  // summed alike, so that what is lit as a whole has a share of exactly 1
     for (int y = 0; y <= push.width; ++y) {
         for (int x = 0; x <= push.width; ++x) {
-            sum += shadow_weight(x, push.width, part.x) * shadow_weight(y, push.width, part.y) * tap(r, first + ivec2(x, y));
+            float weight = shadow_weight(x, push.width, part.x) * shadow_weight(y, push.width, part.y);
+            sum += weight * tap(r, first + ivec2(x, y));
+            weights += weight;
         }
     }
-    return sum / float(push.width * push.width);
+    return sum / weights;
 }
 
 void main() {

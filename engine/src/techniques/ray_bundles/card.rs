@@ -157,7 +157,7 @@ const ROWS: &[Row] = &[Row {
         sources::SZIRMAY_KALOS_PURGATHOFER_1998.whole(),
         sources::SUN_2015.at("§2.2.6"),
     ],
-    shaders: &["shaders/techniques/ray_bundles/", "shaders/raster/surface.vert"],
+    shaders: &["shaders/techniques/ray_bundles/", "shaders/raster/vertex_main.glsl"],
     path_set: Some(DISPLAYED),
     bias: Some(BIAS),
     needs: NEEDS,

@@ -6,9 +6,8 @@
 use glam::{DVec2, Vec3};
 
 use crate::gpu::interface::ShaderInfo;
-use crate::gpu::shaders::raster::surface_vert;
 use crate::gpu::shaders::sets::RasterSet;
-use crate::gpu::shaders::techniques::ray_bundles::{bundle_frag, bundle_hop, bundle_sort};
+use crate::gpu::shaders::techniques::ray_bundles::{bundle_frag, bundle_hop, bundle_sort, bundle_vert};
 use crate::gpu::shaders::types::{BundleEntry, BundleFragment, RasterView};
 use crate::gpu::{
     Access, Area, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, GraphicsDesc, GraphicsPipeline, Pass,
@@ -83,7 +82,7 @@ pub(super) struct Counted {
     pub longest: u32,
 }
 
-type Draws = GraphicsPipeline<surface_vert::Shader, bundle_frag::Shader>;
+type Draws = GraphicsPipeline<bundle_vert::Shader, bundle_frag::Shader>;
 
 /// Words of what the host reads: the longest list in two, all entries, what is left in two.
 const READ_WORDS: u64 = 5;
@@ -116,7 +115,7 @@ pub(super) struct Lists {
 impl Lists {
     /// The kernels that it may take.
     pub const KERNELS: [&'static ShaderInfo; 4] = [
-        &surface_vert::INFO,
+        &bundle_vert::INFO,
         &bundle_frag::INFO,
         &bundle_sort::INFO,
         &bundle_hop::INFO,
@@ -124,7 +123,7 @@ impl Lists {
 
     pub fn new(gpu: &Gpu, side: u32) -> Result<Self> {
         let draws = |writes| {
-            gpu.graphics_pipeline(&GraphicsDesc::<surface_vert::Shader, bundle_frag::Shader> {
+            gpu.graphics_pipeline(&GraphicsDesc::<bundle_vert::Shader, bundle_frag::Shader> {
                 fragment: bundle_frag::Spec {
                     writes,
                     bundle_side: side,
@@ -217,7 +216,7 @@ impl Lists {
             area: Some(Area::whole([self.side; 2])),
             ..Targets::default()
         };
-        let push = surface_vert::Push { first_view: 0 };
+        let push = bundle_vert::Push { first_view: 0 };
         let corner = |triangle: u32| {
             triangle.checked_mul(3).ok_or_else(|| Error::LimitExceeded {
                 name: "surfaces".into(),
