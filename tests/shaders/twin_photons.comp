@@ -152,8 +152,9 @@ void main() {
         out1(8u, at.t);
         out1(9u, at.along.x);
         out1(10u, at.along.y);
-        out1(11u, at.volume);
+        out1(11u, at.jacobian);
         out1(12u, least_extinction(in3(20u)));
+        out1(13u, plane_extinction(in3(23u), in3(20u)));
         break;
     }
     case 7u: {  // footprints in media

@@ -129,20 +129,25 @@ vec3 marched(float t, float d2, float h) {
     return sum / (h * h);
 }
 
+// Whether photons of this medium count here, with so many scatterings before the last one, or of this class.
+bool counts_here(uint medium, uint history) {
+    uint bounces = history + 1u + beam.bounce;
+    bool counts = medium == beam.medium;
+    if (HAS_CLASSES) {
+        counts = counts && (beam.classes >> history & 1u) != 0u;
+    }
+    if (COUNTS_BOUNCES) {
+        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
+    }
+    return counts;
+}
+
 // Adds a beam's light where the ray passes it.
 void add_beam(uvec4 q0, uvec4 q1) {
     PhotonBeam b = unpack_beam(q0, q1);
     vec3 way = b.end - b.start;
     float reach = length(way);
-    uint bounces = b.bounce + 1u + beam.bounce;
-    bool counts = b.medium == beam.medium && reach > 0.0;
-    if (HAS_CLASSES) {
-        counts = counts && (beam.classes >> b.bounce & 1u) != 0u;
-    }
-    if (COUNTS_BOUNCES) {
-        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
-    }
-    if (counts) {
+    if (reach > 0.0 && counts_here(b.medium, b.bounce)) {
         way /= reach;
         BeamMeeting at = meet_beam(beam.origin, beam.direction, b.start, way);
         float relative = at.squared / (push.radius * push.radius);
@@ -158,26 +163,20 @@ void add_beam(uvec4 q0, uvec4 q1) {
 
 // Lets a plane's light count where the ray meets it, and its ray stand for all of them with the probability of its share.
 void add_plane(uint record, PhotonPlane p) {
-    uint bounces = p.bounce + 1u + beam.bounce;
-    bool counts = p.medium == beam.medium;
-    if (HAS_CLASSES) {
-        counts = counts && (beam.classes >> p.bounce & 1u) != 0u;
-    }
-    if (COUNTS_BOUNCES) {
-        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
-    }
-    if (!counts) {
+    if (!counts_here(p.medium, p.bounce)) {
         return;
     }
     PlaneMeeting at = meet_plane(beam.origin, beam.direction, p.start, p.first, p.second);
     bool inside = all(greaterThanEqual(at.along, vec2(0.0))) && all(lessThan(at.along, vec2(1.0)));
-    if (!(at.volume > 0.0) || !inside || !(at.t > beam.from && at.t < beam.to)) {
+    if (!(at.jacobian > 0.0) || !inside || !(at.t > beam.from && at.t < beam.to)) {
         return;
     }
     vec2 lengths = vec2(length(p.first), length(p.second));
     vec3 way = p.second / lengths.y;
-    vec3 left = relative_transmittance(beam.m.sigma_t, least_extinction(beam.m.sigma_t), dot(at.along, lengths));
-    float weight = lengths.x * lengths.y / at.volume * phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+    // Bands that scatter nothing have no light here, however far they come.
+    float extinction = plane_extinction(beam.m.sigma_s, beam.m.sigma_t);
+    vec3 left = relative_transmittance(max(beam.m.sigma_t, vec3(extinction)), extinction, dot(at.along, lengths));
+    float weight = lengths.x * lengths.y / at.jacobian * phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
     vec3 light = weight * beam.m.sigma_s * beam.m.sigma_s * passed_to(at.t) * left * p.flux;
     float all_bands = light.x + light.y + light.z;
     if (!(all_bands > 0.0 && all_bands < FAR_AWAY)) {
@@ -212,14 +211,7 @@ bool compact_visit_beam(uint record) {
     }
     float radius = uintBitsToFloat(q1.y);
     vec2 approach = closest_approach(beam.origin, beam.direction, uintBitsToFloat(q0.xyz));
-    uint bounces = (q1.z >> PHOTON_BOUNCE_SHIFT) + 1u + beam.bounce;
-    bool counts = (q0.w & EVENT_MEDIUM_MASK) == beam.medium && approach.y < radius * radius;
-    if (HAS_CLASSES) {
-        counts = counts && (beam.classes >> (q1.z >> PHOTON_BOUNCE_SHIFT) & 1u) != 0u;
-    }
-    if (COUNTS_BOUNCES) {
-        counts = counts && bounces >= push.least_bounces && bounces <= push.most_bounces;
-    }
+    bool counts = approach.y < radius * radius && counts_here(q0.w & EVENT_MEDIUM_MASK, q1.z >> PHOTON_BOUNCE_SHIFT);
     if (!MARCHES) {
         counts = counts && approach.x > beam.from && approach.x < beam.to;
     }
@@ -348,7 +340,7 @@ void main() {
     uint resume = BEAM_DONE;
     if (!LINEAR) {
         resume = walk_resume[place];
-        if (resume >= BEAM_STOPPED_GATHER_STOPPED && resume <= GATHER_STOPPED && resume != PLACE_SCATTERED) {
+        if (beam_was_asked(resume)) {
             return;
         }
         if (!has_work_left()) {
@@ -412,6 +404,9 @@ void main() {
     // Of a query that goes through records also that there is none, for the records to come.
     if (PLANES && (LINEAR || chosen.total > 0.0)) {
         plane_rays[place] = chosen;
+        if (!LINEAR) {
+            walk_resume[place] = BEAM_TRACING;
+        }
     }
     walk_gathered[slot].radiance += path.throughput * gathered * push.scale;
 }

@@ -105,22 +105,25 @@ float least_extinction(vec3 sigma_t) {
     return min(extinction.x, min(extinction.y, extinction.z));
 }
 
+// Extinction with which the flights of planes end: of the band through which light comes farthest, of those that scatter.
+float plane_extinction(vec3 sigma_s, vec3 sigma_t) { return least_extinction(mix(sigma_t, vec3(0.0), equal(sigma_s, vec3(0.0)))); }
+
 // Where a ray meets the plane that two flights span.
 struct PlaneMeeting {
-    float t;       // along the ray
-    vec2 along;    // shares of the flights
-    float volume;  // of the box that the ray's direction spans with them, m2; 0 where the ray lies in the plane, and nothing else is known
+    float t;         // along the ray
+    vec2 along;      // shares of the flights
+    float jacobian;  // volume of the box that the ray's direction spans with them, m2; 0 where the ray lies in the plane, and nothing else is known
 };
 
 PlaneMeeting meet_plane(vec3 origin, vec3 direction, vec3 start, vec3 first, vec3 second) {
     vec3 across = cross(first, second);
-    float volume = dot(direction, across);
-    if (!(abs(volume) > 0.0)) {
+    float jacobian = dot(direction, across);
+    if (!(abs(jacobian) > 0.0)) {
         return PlaneMeeting(0.0, vec2(-1.0), 0.0);
     }
     vec3 delta = origin - start;
-    vec2 along = vec2(dot(delta, cross(second, direction)), dot(delta, cross(direction, first))) / volume;
-    return PlaneMeeting(-dot(delta, across) / volume, along, abs(volume));
+    vec2 along = vec2(dot(delta, cross(second, direction)), dot(delta, cross(direction, first))) / jacobian;
+    return PlaneMeeting(-dot(delta, across) / jacobian, along, abs(jacobian));
 }
 
 // Kernels of one dimension, of the squared distance in units of the radius: over a radius on both sides they integrate to one.

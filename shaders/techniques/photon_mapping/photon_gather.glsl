@@ -255,6 +255,7 @@ void main() {
     }
     if (!complete) {
         walk_resume[place] = HAS_MEDIA ? gather_stopped(resume) : GATHER_STOPPED;
+        atomicAdd(gather_counters.stopped, 1u);
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_ARRIVAL);
         return;

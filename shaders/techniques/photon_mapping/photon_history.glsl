@@ -16,7 +16,7 @@ const uint FLAG_LANDED = 32u;
 // Two flights wait there, where planes are stored.
 const uint FLAG_PLANE = 64u;
 
-// Stand for the density of directions in a photon's walk: whether its way begins at a collision with the medium that it goes through.
+// Stand for the density of directions in a photon's walk, where planes are stored: whether its way begins at a collision with the medium that it goes through.
 const float PHOTON_FROM_COLLISION = 1.0;
 const float PHOTON_FROM_ELSEWHERE = 0.0;
 

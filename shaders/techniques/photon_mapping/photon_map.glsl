@@ -13,6 +13,7 @@ layout(set = 1, binding = 1) uniform utextureBuffer photon_map_records;
 layout(set = 1, binding = 2, scalar) restrict buffer GatherCounters {
     uint queries;
     uint photons[2];  // kernels that held a point: 64 bits, the low word first
+    uint stopped;     // queries that their quota stopped
 } gather_counters;
 
 uvec4 compact_quarter(uint index) { return texelFetch(photon_pairs, int(index)); }

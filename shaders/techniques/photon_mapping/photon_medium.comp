@@ -1,6 +1,6 @@
 #version 460
 // Photons on their way through media: free flight to a collision, where it is stored and scattered, or absorbed; on through a boundary; or with what is left
-// of it to the surface, for photon_scatter.comp.
+// of it to the surface, for photon_scatter.comp. Or, of media that are seen by beams, whole ways; or by planes, two flights as well.
 //
 // Free flights are those of eye paths (transport/medium.glsl, transport/media_tracking.glsl): analytic in homogeneous media, delta tracking in grids, one walk
 // for all bands. A collision stores the flux that it scatters; the photon goes on with the probability that leaves its largest band as it is. Where a medium
@@ -9,7 +9,8 @@
 // Where kernels follow footprints these pass and scatter with the photon (photon_footprint.glsl); in grids what has passed is reckoned from the bounds of the density.
 //
 // PM-PH-1, PM-PD-9 to PM-PD-12: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.1.3 and 7.2.3; H. W. Jensen and P. H. Christensen, "Efficient Simulation of
-// Light Transport in Scenes with Participating Media Using Photon Maps", 1998. Deterministic in (seed, pass, photon).
+// Light Transport in Scenes with Participating Media Using Photon Maps", 1998; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light
+// Transport", 2017. Deterministic in (seed, pass, photon).
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -35,6 +36,7 @@ layout(push_constant, scalar) uniform Push {
     uint pieces_most;    // of a way
     uint classes[2];     // successors of each class of photons by scattering in a medium
     float plane_share;   // of ways that have planes
+    float body_reach;    // no two places of a body are farther apart, m
     float path_share;    // of kernels' radii over the mean free path of their medium at its densest, at most; 0 for any
     EventKernelSettings kernel;  // without footprints all have the greatest radius
 } push;
@@ -98,8 +100,8 @@ uint state_after(uint state) {
 float flight(float extinction, uint bits) { return -log(1.0 - unit_float(bits)) / extinction; }
 
 // Stores the photon's flight along its way, `reach` long, and one into a direction that it may be scattered in, however far the photon itself comes. Both end by chance, as
-// in the band that comes farthest: what other bands have less of is a query's.
-uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
+// in the band that comes farthest: what other bands have less of is a query's. In a body the second one has an end, beyond which nothing of the body lies.
+uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach, bool in_body) {
     uint history = path_set_bounce(photon.bounce) + 1u;
     if (HAS_CLASSES) {
         history = state_after(path_set_state(photon.bounce));
@@ -109,12 +111,13 @@ uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMe
     if (HAS_CLASSES && history == PATH_SET_DEAD || !(unit_float(turn.x) < push.plane_share)) {
         return 0u;
     }
-    float extinction = least_extinction(m.sigma_t);
+    float extinction = plane_extinction(m.sigma_s, m.sigma_t);
+    float far = flight(extinction, flights.y);
     float c = phase_function_sample(m.phase, m.phase_parameter, unit_float(turn.y));
     PhotonPlane plane;
     plane.start = photon.origin + start * photon.direction;
     plane.first = min(reach, flight(extinction, flights.x)) * photon.direction;
-    plane.second = flight(extinction, flights.y) * normalize(phase_direction(photon.direction, c, unit_float(turn.z)));
+    plane.second = (in_body ? min(far, push.body_reach) : far) * normalize(phase_direction(photon.direction, c, unit_float(turn.z)));
     plane.flux = dithered_flux(photon.throughput * push.flux_scale, slot, path_set_bounce(photon.bounce));
     plane.medium = medium;
     plane.bounce = history;
@@ -170,7 +173,9 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
     photon.direction = wi;
     photon.origin = at;
     photon.throughput /= survival;
-    photon.pdf = PHOTON_FROM_COLLISION;
+    if (STORES_PLANES) {
+        photon.pdf = PHOTON_FROM_COLLISION;
+    }
     photon.bounce = path_set_joined(bounce + 1u, after);
     return true;
 }
@@ -223,7 +228,7 @@ void main() {
                 flags = deposit_way(slot, place, photon, medium, m, begin, reach);
             }
             if (STORES_PLANES && path_set_bounce(photon.bounce) < push.last_bounce) {
-                flags |= deposit_plane(slot, place, photon, medium, m, begin, reach);
+                flags |= deposit_plane(slot, place, photon, medium, m, begin, reach, crossing.interior != OUTSIDE);
             }
         }
         if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
@@ -296,7 +301,9 @@ void main() {
         alive = photon.throughput != vec3(0.0);
     } else if (crossing.boundary) {
         state.start = past_surface(hit.t);
-        photon.pdf = PHOTON_FROM_ELSEWHERE;
+        if (STORES_PLANES) {
+            photon.pdf = PHOTON_FROM_ELSEWHERE;
+        }
         interior = crossing.beyond;
         alive = photon.throughput != vec3(0.0);
     } else {

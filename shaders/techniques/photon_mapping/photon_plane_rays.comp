@@ -2,7 +2,8 @@
 // Rays of eye paths along photons' second flights: what each is chosen to stand for counts where nothing is in between, boundaries of media among all else, since planes lie in one body.
 //
 // Rays that their quota stops, or that are left for later, stall the wave as an arrival stage does, and go on when it is recorded again; those of queries that went through all
-// records are told so (`goes_on`), and are counted instead. A pixel has one writer.
+// records are told so (`goes_on`), and are counted instead. What is seen on surfaces waits for them, so that a
+// pixel, which has one writer, has a sum of one order.
 //
 // B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", 2017. Deterministic in (seed, pixel, sample) and the map.
 // variant: driver
@@ -13,10 +14,12 @@ layout(local_size_x = 64) in;
 
 #include "walk/candidates.glsl"
 #include "techniques/photon_mapping/photon_plane_ray.glsl"
+#include "techniques/photon_mapping/photon_query_state.glsl"
 
 layout(set = 3, binding = 0, scalar) restrict buffer PhotonPlaneRays { PlaneRay plane_rays[]; };
 layout(set = 3, binding = 1, scalar) restrict buffer PlaneRayCounters {
     uint remaining;  // rays of a sweep that are not at their ends
+    uint rays[2];    // that are: 64 bits, the low word first
 } plane_ray_counters;
 
 // Stands for the bounce in the key of what rays meet by chance, so that those of shadow rays do not return.
@@ -47,6 +50,10 @@ void main() {
             leave_for_later(STALLED_ARRIVAL);
         }
         return;
+    }
+    COUNT_WIDE(plane_ray_counters.rays, 1u)
+    if (!sweeps) {
+        walk_resume[place] = BEAM_DONE;
     }
     if (hit.triangle == NO_HIT) {
         walk_gathered[slot].radiance += ray.color * ray.total;

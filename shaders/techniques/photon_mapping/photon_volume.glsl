@@ -11,7 +11,7 @@
 // descriptor set 1: PhotonVolumeSet
 
 layout(constant_id = 55) const bool STORES_WAYS = false;  // ways of photons are stored, instead of their collisions
-layout(constant_id = 56) const bool STORES_PLANES = false;  // and of ways that begin at a collision the planes that they lie in
+layout(constant_id = 56) const bool STORES_PLANES = false;  // and a plane of each way, in place of the beams of ways that begin at a collision
 
 // A photon's way through a homogeneous medium, with what is left of its flux along it.
 struct PhotonWay {

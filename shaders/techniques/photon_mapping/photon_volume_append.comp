@@ -34,17 +34,15 @@ void append_way(uint place, uint event, uint pieces) {
     }
 }
 
-// Two flights become a plane, behind the beams of the same place; the records that come before.
-uint append_plane(uint place, uint event, uint records) {
-    uint flags = texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL];
-    if ((flags & FLAG_PLANE) == 0u) {
-        return records;
+bool has_plane(uint place) {
+    return STORES_PLANES && (texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & FLAG_PLANE) != 0u;
+}
+
+// Two flights become a plane.
+void append_plane(uint place, uint event) {
+    for (uint i = 0u; event < push.event_capacity && i < PLANE_QUARTERS; ++i) {
+        photon_volume_records[PLANE_QUARTERS * event + i] = photon_planes[PLANE_QUARTERS * place + i];
     }
-    uint last = event + records - 1u;
-    for (uint i = 0u; last < push.event_capacity && i < PLANE_QUARTERS; ++i) {
-        photon_volume_records[PLANE_QUARTERS * last + i] = photon_planes[PLANE_QUARTERS * place + i];
-    }
-    return records - 1u;
 }
 
 void main() {
@@ -62,7 +60,11 @@ void main() {
     uint source = WAITING_QUARTERS * place;
     uint event = push.first_event + before + rank;
     if (STORES_WAYS) {
-        append_way(place, event, STORES_PLANES ? append_plane(place, event, in_medium) : in_medium);
+        uint planes = has_plane(place) ? 1u : 0u;
+        append_way(place, event, in_medium - planes);
+        if (planes != 0u) {
+            append_plane(place, event + in_medium - planes);
+        }
         // Ranks of surfaces go over the wave's earlier bounces as those of media do.
         uint landed = photon_landed_flags[waiting];
         uint landed_rank = photon_landed_ranks[waiting];

@@ -3,11 +3,11 @@
 use super::volume::{airlight, endless, lit_box, single};
 use super::volume_truths::{exactly, parallel};
 use super::*;
-use clerestory::scene::{Medium, Phase};
+use clerestory::scene::{AlphaMode, Medium, Phase};
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
 use clerestory_tests::render::{builtin, cuboid, medium};
 use clerestory_tests::with_gpu;
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 /// Light that is scattered in a medium twice at last, with no surface in between: that of planes alone.
 const OF_PLANES: &str = "L.*VVE";
@@ -15,7 +15,7 @@ const OF_PLANES: &str = "L.*VVE";
 fn planes(set: &str, photons: u32) -> PhotonSettings {
     PhotonSettings {
         volume: VolumeEstimate::Planes,
-        // Of beams, which the light of planes has none of.
+        // All ways have planes; of beams there is none in the light of planes.
         volume_radius: 0.3,
         photons,
         ..settings(set)
@@ -58,6 +58,21 @@ fn planes_agree_with_the_path_tracer_without_blur() {
         ] {
             expect_agreement(gpu, &scene, &planes(OF_PLANES, 1 << 11), [24, 1024], [0.0; 3]);
         }
+        // A share of all ways that the radius of beams says; and rays along flights that pass a sheet with holes.
+        let mut sheet = lit_box(forward());
+        let holes = sheet.add_material(Material {
+            base_color: Vec4::new(0.5, 0.5, 0.5, 0.5),
+            alpha_mode: AlphaMode::Blend,
+            ..Material::lambert("holes", Vec3::ZERO)
+        });
+        sheet.place(cuboid("sheet", holes, Vec3::new(-0.2, -0.3, -0.3), Vec3::new(-0.19, 0.3, 0.3)));
+        for scene in [lit_box(coloured), sheet] {
+            let shared = PhotonSettings {
+                volume_radius: 0.0,
+                ..planes(OF_PLANES, 1 << 12)
+            };
+            expect_agreement(gpu, &scene, &shared, [24, 1024], [0.0; 3]);
+        }
     });
 }
 
@@ -69,18 +84,21 @@ fn planes_and_beams_have_every_path_once() {
         let boundary = scene.meshes[1].material;
         let (low, high) = (Vec3::new(0.55, -0.5, -0.5), Vec3::new(0.8, 0.2, 0.5));
         scene.place(cuboid("second box", boundary.unwrap_or(0), low, high));
-        let reference = traced(gpu, &scene, "bounces=2..4", 1024);
-        for volume in [VolumeEstimate::Beams, VolumeEstimate::Planes] {
-            let settings = PhotonSettings {
-                volume,
-                volume_radius: 0.02,
-                radius: 0.1,
-                ..planes("bounces=2..4", 1 << 12)
-            };
-            let found = means(gpu, &scene, &settings, 16);
-            // As of beams in one box (`volume.rs`).
-            found.expect_same_as(&format!("{volume:?}"), &reference, [1.5e-2; 3]);
-            assert!(found.counts.beams.photons > 1000);
+        scene.cameras = vec![camera_down(0.85, 5.0)];
+        for set in ["bounces=2..4", "LVVE"] {
+            let reference = traced(gpu, &scene, set, 1024);
+            for volume in [VolumeEstimate::Beams, VolumeEstimate::Planes] {
+                let settings = PhotonSettings {
+                    volume,
+                    volume_radius: 0.02,
+                    radius: 0.1,
+                    ..planes(set, 1 << 12)
+                };
+                let found = means(gpu, &scene, &settings, 16);
+                // As of beams in one box (`volume.rs`).
+                found.expect_same_as(&format!("{volume:?}, {set}"), &reference, [1.5e-2; 3]);
+                assert!(found.counts.beams.photons > 1000);
+            }
         }
     });
 }
@@ -123,11 +141,12 @@ fn lengths_times_eight_give_a_sixty_fourth_by_planes() {
 fn planes_that_a_quota_stops_go_through_all_records() {
     with_gpu(|gpu| {
         let scene = builtin("builtin:fog-box?sphere=glass&sigma_s=3");
+        // Of all light, so that what is seen on surfaces waits for rays along flights.
         let of = |query_quota, submission_work| {
             let settings = PhotonSettings {
                 query_quota,
                 submission_work,
-                ..planes(OF_PLANES, 1 << 9)
+                ..planes("all", 1 << 9)
             };
             let mut mapper = mapper(gpu, &scene, &settings);
             let picture = advance(&mut mapper, 2);
@@ -135,6 +154,7 @@ fn planes_that_a_quota_stops_go_through_all_records() {
         };
         let (whole, counts, stalls) = of(32_768, 0);
         assert!(stalls == 0 && counts.photons > 1000);
+        assert!(counts.rays > 100 && counts.rays <= counts.queries, "{counts:?}");
         // What is left for later, rays along flights among it, never shows.
         assert_eq!(bits(&of(32_768, 1).0), bits(&whole));
         let (stopped, stopped_counts, stalls) = of(64, 0);
@@ -144,6 +164,27 @@ fn planes_that_a_quota_stops_go_through_all_records() {
         for (i, (a, b)) in whole.iter().zip(&stopped).enumerate() {
             assert!((a - b).abs() <= 1e-5 * a, "{i}: {b}, not {a}");
         }
+    });
+}
+
+/// Flights in a body end where it does, at most, so that few boxes hold a ray however thin the medium is.
+#[test]
+fn planes_of_thin_bodies_are_no_larger_than_these() {
+    with_gpu(|gpu| {
+        let thin = Medium {
+            // A band that scatters nothing, and would come very far.
+            sigma_s: Vec3::new(0.08, 0.08, 0.0),
+            sigma_a: Vec3::new(0.0, 0.0, 1e-4),
+            ..Medium::default()
+        };
+        let of = |medium: Medium| {
+            let settings = planes(OF_PLANES, 1 << 12);
+            let mut mapper = mapper(gpu, &lit_box(medium), &settings);
+            advance(&mut mapper, 2);
+            assert_eq!(mapper.eye_counters().stalls, 0);
+            mapper.counts().beams
+        };
+        assert!(of(thin).photons > 100);
     });
 }
 

@@ -15,7 +15,7 @@ use clerestory::techniques::photon_mapping::volume::footprint::{
     EventKernelSettings, event_radius, footprint_across, log_of_one_plus, passed_differentials, scattered_in_medium,
 };
 use clerestory::techniques::photon_mapping::volume::plane::{
-    PhotonPlane, is_plane, least_extinction, meet_plane, pack_plane, unpack_plane,
+    PhotonPlane, is_plane, least_extinction, meet_plane, pack_plane, plane_extinction, unpack_plane,
 };
 use clerestory::transport::differentials::{
     Differentials, area_light_differentials, camera_differentials, diffuse_reemission, emission_differentials,
@@ -659,7 +659,9 @@ fn planes_agree_with_their_twins() {
             let rest = [code(r.below(1 << 20)), code(r.below(80))];
             let mut all = list32(&[4.0 * r.vector(), first, second, color], &rest);
             let extinctions = [0; 3].map(|_| r.choose(&[0.0, 0.5, 1.0, 3.0]));
-            all.extend(list32(&[4.0 * r.vector(), ray, Vec3::from_array(extinctions)], &[]));
+            let scatters = [0; 3].map(|_| r.choose(&[0.0, 0.25]));
+            let media = [extinctions, scatters].map(Vec3::from_array);
+            all.extend(list32(&[4.0 * r.vector(), ray, media[0], media[1]], &[]));
             all
         });
         let results = twin_photons(gpu, 9, &table, &[]);
@@ -680,11 +682,16 @@ fn planes_agree_with_their_twins() {
             let back = unpack_plane(&words);
             assert_eq!([result.bits(3), result.bits(4)], [back.medium, back.bounce]);
             assert_eq!(Vec3::from_slice(&result.0[5..]), back.first);
-            let least = least_extinction(v3(&x, 20));
-            assert!(
-                result.0[12] == least as f32 || least.is_infinite() && result.0[12] > 1e38,
-                "{least}"
-            );
+            let extinctions = [
+                least_extinction(v3(&x, 20)),
+                plane_extinction(v3(&x, 23), v3(&x, 20)),
+            ];
+            for (found, expected) in result.0[12..].iter().zip(extinctions) {
+                assert!(
+                    *found == expected as f32 || expected.is_infinite() && *found > 1e38,
+                    "{found} {expected}"
+                );
+            }
             if !is_plane(&words) {
                 assert_eq!(result.0[11], 0.0);
                 continue;
@@ -698,7 +705,7 @@ fn planes_agree_with_their_twins() {
                 "{:?}",
                 case.0
             );
-            assert!((f64::from(result.0[11]) - met.volume).abs() <= 64.0 * U, "{:?}", case.0);
+            assert!((f64::from(result.0[11]) - met.jacobian).abs() <= 64.0 * U, "{:?}", case.0);
         }
     });
 }

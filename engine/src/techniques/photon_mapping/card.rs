@@ -160,7 +160,7 @@ impl Technique for PhotonMapper {
             ("extend_rays", eye.extend_rays),
             ("shadow_rays", eye.shadow_rays),
             ("photon_rays", c.photons.rays),
-            ("rays", eye.extend_rays + eye.shadow_rays + c.photons.rays),
+            ("rays", eye.extend_rays + eye.shadow_rays + c.photons.rays + c.beams.rays),
             ("waves", eye.waves),
             ("stalls", eye.stalls),
             ("postponed", eye.postponed),
@@ -179,6 +179,7 @@ impl Technique for PhotonMapper {
                 ("events_stored", c.events),
                 ("beam_queries", c.beams.queries),
                 ("events_gathered", c.beams.photons),
+                ("plane_rays", c.beams.rays),
             ]);
         }
         all

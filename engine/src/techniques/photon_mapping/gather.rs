@@ -6,7 +6,7 @@ use super::map::PhotonMap;
 use super::path_classes::{ASKING_STATES, PathClasses};
 use super::queue::{AskSpec, Queue};
 use super::settings::{MapQuery, PhotonSettings};
-use super::volume::{Beam, BeamAsk, BeamStage, EventMap};
+use super::volume::{Beam, BeamAsk, BeamStage, EventMap, SWEEPS_MAX};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
@@ -32,8 +32,6 @@ const NEAREST_SEARCHES: u32 = NEAREST_ROUNDS + NEAREST_HALVINGS;
 /// Records that a submission takes at all of its places, where no hierarchy helps: a fraction of a second on devices that a driver watches.
 const LINEAR_RECORDS: u64 = 1 << 28;
 
-/// First part that goes through the records of surfaces at stopped places, in scenes whose map of media has planes: sweeps over the rays of these come before, however many.
-const PARTS_BEHIND_SWEEPS: u64 = 1 << 40;
 
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -43,6 +41,16 @@ pub struct GatherCounts {
     pub queries: u64,
     /// Kernels that held them.
     pub photons: u64,
+    /// Rays that told whether what was found is seen: of photon planes alone.
+    pub rays: u64,
+}
+
+impl std::ops::AddAssign for GatherCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.queries += other.queries;
+        self.photons += other.photons;
+        self.rays += other.rays;
+    }
 }
 
 /// Each point by itself, or those of a subgroup together.
@@ -241,6 +249,7 @@ impl Gather {
         Ok(GatherCounts {
             queries: u64::from(counters.queries),
             photons: wide_counter(counters.photons),
+            rays: 0,
         })
     }
 
@@ -297,9 +306,9 @@ impl ArrivalStage for GatherStage<'_> {
         if let Some(beam) = &self.beam {
             recorder.pass("photon: beams", |pass| beam.record(pass, self.scene, wave, places))?;
         }
-        if let Some(beam) = self.beam.as_ref().filter(|beam| beam.has_plane_rays()) {
+        if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
             recorder.pass("photon: plane rays", |pass| {
-                beam.record_plane_rays(pass, self.scene, wave, places)
+                planes.record(pass, self.scene, wave, places)
             })?;
         }
         let mut groups = places.items;
@@ -371,15 +380,20 @@ impl ArrivalStage for GatherStage<'_> {
             return Ok(Some(part));
         }
         let mut first_part = of_beams;
-        if let Some(beam) = self.beam.as_ref().filter(|beam| beam.has_plane_rays()) {
-            first_part = PARTS_BEHIND_SWEEPS;
+        if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
+            // However many sweeps there are, what comes behind has the same number.
+            first_part = of_beams + SWEEPS_MAX + 2;
             let sweep = part - of_beams;
-            if part < first_part && (sweep == 0 || beam.plane_rays_remain()?) {
+            if part < first_part && (sweep == 0 || planes.remain()?) {
                 recorder.pass("photon: plane rays all", |pass| {
-                    beam.record_plane_sweep(pass, self.scene, wave, stopped, sweep)
+                    planes.record_sweep(pass, self.scene, wave, stopped, sweep)
                 })?;
                 return Ok(Some(part + 1));
             }
+        }
+        if gather.counters_readback.read::<Counters>(0, 1)?[0].stopped == 0 {
+            // Beams alone have stopped.
+            return Ok(None);
         }
         let Linear::Records(_, made) = &gather.linear else {
             return Err(Error::Overflow {

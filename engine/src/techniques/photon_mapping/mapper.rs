@@ -383,12 +383,8 @@ impl PhotonMapper {
         if let Some(photons) = &mut self.photons {
             // They are those of a whole wave.
             if step.is_some() && !self.eye.is_within_wave() {
-                let counts = photons.gather.counts()?;
-                self.counts.gather.queries += counts.queries;
-                self.counts.gather.photons += counts.photons;
-                let beams = photons.gather.volume_counts()?;
-                self.counts.beams.queries += beams.queries;
-                self.counts.beams.photons += beams.photons;
+                self.counts.gather += photons.gather.counts()?;
+                self.counts.beams += photons.gather.volume_counts()?;
             }
         }
         let Some(mut step) = step else {
@@ -433,7 +429,8 @@ impl PhotonMapper {
     }
 
     /// Traces the photons of a pass, and returns their collisions with media that are stored, in the order of waves, in each of bounces and photons. The picture is
-    /// not touched, and counts go on. With [`VolumeEstimate::Beams`](super::volume::VolumeEstimate::Beams) and planes there are none.
+    /// not touched, and counts go on. With [`VolumeEstimate::Beams`](super::volume::VolumeEstimate::Beams) and
+    /// [`VolumeEstimate::Planes`](super::volume::VolumeEstimate::Planes) there are none.
     ///
     /// # Errors
     /// As [`PhotonMapper::step`].
@@ -500,7 +497,7 @@ impl PhotonMapper {
         self.settings.event_path_share(pass, &self.media_lengths())
     }
 
-    /// Of ways that have planes, where these are stored: as many less as beams are narrower.
+    /// Share of ways that have planes, where these are stored: that of the automatic radius which beams have, so that rays meet as many planes; all where the radius is given.
     fn plane_share(&self) -> f64 {
         if self.settings.radius_is_automatic() {
             self.event_share

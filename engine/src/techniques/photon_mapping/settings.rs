@@ -137,7 +137,7 @@ crate::settings! {
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.
         ///
         /// 0 stands for the radius of fixed kernels under which rays meet some tens of them, which a small picture of few photons finds out, at most a fiftieth of the scene's diagonal
-        /// and in each medium a quarter of its mean free path; and for a ninth of the diagonal for others. Where there are planes so many less ways have one; with a radius all have.
+        /// and in each medium a quarter of its mean free path; and for a ninth of the diagonal for others. With planes, which are met with beams, the same share of all ways has one; with a radius of your own all have.
         pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
         /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";

@@ -601,6 +601,7 @@ impl WalkStages for PhotonStages<'_> {
                 last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
                 flux_scale: flux_scale(&kit.scene) as f32,
                 piece: WAY_PIECE_SHARE * (upper - lower).length(),
+                body_reach: (upper - lower).length(),
                 classes: kit.classes.as_ref().map_or([0; 2], |(_, in_media)| *in_media),
                 kernel: self.event_kernel.copied(),
                 path_share: self.path_share as f32,

@@ -122,10 +122,11 @@ impl Beam {
             linear: (Box::new(spec(true)), OnceLock::new()),
             ways: work("beam ways", size_of::<BeamWay>(), slots)?,
             asked: work("beam asked", size_of::<f32>(), asked)?,
-            planes: match settings.volume.stores_planes() {
-                true => Some(PlaneRays::new(gpu, scene, slots)?),
-                false => None,
-            },
+            planes: settings
+                .volume
+                .stores_planes()
+                .then(|| PlaneRays::new(gpu, scene, slots))
+                .transpose()?,
             counters: work("beam counters", bytes as usize, 1)?,
             counters_readback: gpu.buffer(&BufferDesc::readback("beam counters", bytes))?,
             states: surface_states | volume_states,
@@ -148,12 +149,13 @@ impl Beam {
         self.ways.view()
     }
 
-    /// Counts of the last wave: ways that asked, and events that they met.
+    /// Counts of the last wave: ways that asked, events that they met, and rays towards planes.
     pub fn counts(&self) -> Result<GatherCounts> {
         let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
         Ok(GatherCounts {
             queries: u64::from(counters.queries),
             photons: wide_counter(counters.events),
+            rays: self.planes.as_ref().map_or(Ok(0), PlaneRays::count)?,
         })
     }
 }
@@ -197,6 +199,9 @@ impl BeamStage<'_> {
     }
 
     pub fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        if let Some(planes) = &self.beam.planes {
+            planes.read_back(pass)?;
+        }
         pass.copy(self.beam.counters.view(), self.beam.counters_readback.view())
     }
 
@@ -209,39 +214,9 @@ impl BeamStage<'_> {
         Ok(())
     }
 
-    /// Whether eye paths send rays along the flights of planes.
-    pub fn has_plane_rays(&self) -> bool {
-        self.beam.planes.is_some()
-    }
-
-    /// Records these rays, behind queries.
-    pub fn record_plane_rays(
-        &self,
-        pass: &mut Pass<'_>,
-        scene: &GpuScene,
-        wave: &WaveSet<'_>,
-        places: Places<'_>,
-    ) -> Result<()> {
-        let planes = self.beam.planes.as_ref();
-        planes.map_or(Ok(()), |planes| planes.record(pass, scene, wave, places))
-    }
-
-    /// Whether a sweep over the rays of stopped places has left some that are not at their ends.
-    pub fn plane_rays_remain(&self) -> Result<bool> {
-        self.beam.planes.as_ref().map_or(Ok(false), PlaneRays::remain)
-    }
-
-    /// Records a sweep over these.
-    pub fn record_plane_sweep(
-        &self,
-        pass: &mut Pass<'_>,
-        scene: &GpuScene,
-        wave: &WaveSet<'_>,
-        stopped: StoppedPlaces,
-        sweep: u64,
-    ) -> Result<()> {
-        let planes = self.beam.planes.as_ref();
-        planes.map_or(Ok(()), |planes| planes.record_sweep(pass, scene, wave, stopped, sweep))
+    /// The rays that eye paths send along the flights of planes, behind queries.
+    pub fn planes(&self) -> Option<&PlaneRays> {
+        self.beam.planes.as_ref()
     }
 
     pub fn prepare_stopped(&self) -> Result<()> {

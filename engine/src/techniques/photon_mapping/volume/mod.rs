@@ -20,6 +20,7 @@ mod trace;
 
 pub(super) use beam::{Beam, BeamAsk, BeamStage};
 pub(super) use map::{EventMap, EventMaps};
+pub(super) use plane_rays::SWEEPS_MAX;
 pub(super) use trace::{Room, VolumeOptions, VolumePass, VolumeTrace};
 
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -176,7 +177,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-PHOTON-PLANES",
         name: "photon planes: two flights in a row through a medium, seen where a ray meets what they span, without kernels",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Homogeneous media alone, and only light scattered there twice at last with nothing in between, the rest by beams; short flights; a ray nearly in a plane is noise without bound; one ray along a flight stands for all planes of an eye path's way.",
+        limits: "Homogeneous media alone, and only light scattered there twice at last with nothing in between, the rest by beams; short flights; a ray nearly in a plane is noise without bound, by which the variance grows with the logarithm of the number of planes; one ray along a flight stands for all planes of an eye path's way.",
         sources: &[sources::BITTERLI_JAROSZ_2017.whole()],
         bias: Some(Bias::Unbiased),
         shaders: &[
@@ -196,6 +197,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/planes.rs::single_scattering_is_that_of_beams",
             "tests/tests/photon/planes.rs::lengths_times_eight_give_a_sixty_fourth_by_planes",
             "tests/tests/photon/planes.rs::planes_that_a_quota_stops_go_through_all_records",
+            "tests/tests/photon/planes.rs::planes_of_thin_bodies_are_no_larger_than_these",
             "tests/tests/photon/planes.rs::what_is_chosen_alone_has_planes",
             "tests/tests/photon/planes.rs::errors_of_planes_fall_with_the_root_of_passes",
             "tests/tests/twins/photons.rs::planes_agree_with_their_twins",

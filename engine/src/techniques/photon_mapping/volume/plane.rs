@@ -2,9 +2,10 @@
 //!
 //! Source: B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", ACM TOG 36(4), 2017: the distances
 //! of both flights and that along the eye's ray are integrated over, which leaves a Jacobian in the place of a kernel, L = Σ τ(t) σs² p(ω₂, −v) Φ / |v · (ω₁ × ω₂)|. Flights are
-//! short: each ends by chance, as in the band that comes farthest.
+//! short: each ends by chance, as in the band that comes farthest of those that scatter.
 //!
-//! Guarantees: nothing is blurred; boxes hold their planes but for rounding. Limits: a ray in the plane itself has no bound, and little of a plane's area.
+//! Guarantees: nothing is blurred; boxes hold their planes but for rounding. Limits: a ray in the plane itself has no bound, and little of a plane's area:
+//! the variance of what one ray sees grows with the logarithm of the number of planes.
 
 use super::event::{PhotonBeam, pack_beam, unpack_beam};
 use crate::gpu::shaders::constants::PLANE_QUARTERS;
@@ -74,6 +75,11 @@ pub fn least_extinction(sigma_t: DVec3) -> f64 {
     extinctions.fold(f64::INFINITY, f64::min)
 }
 
+/// Extinction with which the flights of planes end: of the band through which light comes farthest, of those that scatter, 1/m; infinite where none does.
+pub fn plane_extinction(sigma_s: DVec3, sigma_t: DVec3) -> f64 {
+    least_extinction(DVec3::select(sigma_s.cmpeq(DVec3::ZERO), DVec3::ZERO, sigma_t))
+}
+
 /// Where a ray meets the plane that two flights span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneMeeting {
@@ -81,27 +87,27 @@ pub struct PlaneMeeting {
     pub t: f64,
     /// Shares of the flights.
     pub along: [f64; 2],
-    /// Of the box that the ray's direction spans with them, m²; 0 where the ray lies in the plane, and nothing else is known.
-    pub volume: f64,
+    /// Volume of the box that the ray's direction spans with them, m²; 0 where the ray lies in the plane, and nothing else is known.
+    pub jacobian: f64,
 }
 
 /// Where a ray meets the plane from `start` on that two flights span.
 pub fn meet_plane(origin: DVec3, direction: DVec3, start: DVec3, first: DVec3, second: DVec3) -> PlaneMeeting {
     let across = first.cross(second);
-    let volume = direction.dot(across);
-    if volume == 0.0 {
+    let jacobian = direction.dot(across);
+    if jacobian == 0.0 {
         return PlaneMeeting {
             t: 0.0,
             along: [-1.0; 2],
-            volume: 0.0,
+            jacobian: 0.0,
         };
     }
     let delta = origin - start;
-    let shares = [second.cross(direction), direction.cross(first)].map(|normal| delta.dot(normal) / volume);
+    let shares = [second.cross(direction), direction.cross(first)].map(|normal| delta.dot(normal) / jacobian);
     PlaneMeeting {
-        t: -delta.dot(across) / volume,
+        t: -delta.dot(across) / jacobian,
         along: shares,
-        volume: volume.abs(),
+        jacobian: jacobian.abs(),
     }
 }
 
@@ -168,17 +174,20 @@ mod tests {
             let [origin, start, first, second] = [0; 4].map(|_| random.vector().as_dvec3());
             let direction = random.direction().as_dvec3().normalize();
             let met = meet_plane(origin, direction, start, first, second);
-            assert!((met.volume - direction.dot(first.cross(second)).abs()).abs() < 1e-15);
+            assert!((met.jacobian - direction.dot(first.cross(second)).abs()).abs() < 1e-15);
             let by_ray = origin + met.t * direction;
             let by_plane = start + met.along[0] * first + met.along[1] * second;
-            assert!(by_ray.distance(by_plane) < 1e-12 / met.volume, "{met:?}");
+            assert!(by_ray.distance(by_plane) < 1e-12 / met.jacobian, "{met:?}");
         }
         assert_eq!(
-            meet_plane(DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::Z).volume,
+            meet_plane(DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X, DVec3::Z).jacobian,
             0.0
         );
         // Bands without extinction are none that flights end in.
         assert_eq!(least_extinction(DVec3::new(0.0, 3.0, 2.0)), 2.0);
+        // Nor those that scatter nothing.
+        let (sigma_s, sigma_t) = (DVec3::new(0.5, 0.0, 1.0), DVec3::new(2.0, 0.1, 1.5));
+        assert_eq!(plane_extinction(sigma_s, sigma_t), 1.5);
     }
 
     #[test]
@@ -215,12 +224,12 @@ mod tests {
                 let far = 60.0;
                 let met = meet_plane(DVec3::ZERO, ray, start, reach * laser, far * w);
                 let inside = met.along.iter().all(|share| (0.0..1.0).contains(share));
-                if met.volume > 0.0 && inside && met.t > 0.0 && met.t < t_max {
+                if met.jacobian > 0.0 && inside && met.t > 0.0 && met.t < t_max {
                     // The probability that both flights come as far is the transmittance.
                     let along = met.along[0] * reach + met.along[1] * far;
                     let left = (-sigma_t * (along + met.t)).exp();
                     let density = phase_function(phase, laser, w);
-                    let light = reach * far / met.volume * sigma_s * sigma_s * phase_function(phase, w, -ray) * left;
+                    let light = reach * far / met.jacobian * sigma_s * sigma_s * phase_function(phase, w, -ray) * left;
                     found += density * light;
                 }
             }

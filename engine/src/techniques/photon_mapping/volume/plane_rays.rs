@@ -5,18 +5,21 @@ use crate::gpu::shaders::constants::{NO_MEDIUM, PLANE_RAY_ENDED, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::techniques::photon_mapping::photon_plane_rays;
 use crate::gpu::shaders::types::PlaneRay;
-use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, wide_counter};
 use crate::transport::GpuScene;
 use crate::walk::{Places, RAY_QUOTA, StoppedPlaces, WalkKey, ray_quota, stage_barrier};
 use crate::{Error, Result};
 
 /// Sweeps over rays that were stopped before they count as endless.
-const SWEEPS_MAX: u64 = 1 << 16;
+pub(in crate::techniques::photon_mapping) const SWEEPS_MAX: u64 = 1 << 16;
 
 type Counters = photon_plane_rays::PlaneRayCounters;
 
+/// Where [`Counters::remaining`](Counters) is.
+const REMAINING: u64 = std::mem::offset_of!(Counters, remaining) as u64;
+
 /// The kernel, with the rays of a wave.
-pub(super) struct PlaneRays {
+pub(in crate::techniques::photon_mapping) struct PlaneRays {
     kernel: ComputePipeline<photon_plane_rays::Kernel>,
     rays: Buffer,
     counters: Buffer,
@@ -77,6 +80,15 @@ impl PlaneRays {
         Ok(())
     }
 
+    /// Rays of the last wave.
+    pub fn count(&self) -> Result<u64> {
+        Ok(wide_counter(self.counters_readback.read::<Counters>(0, 1)?[0].rays))
+    }
+
+    pub fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
+        pass.copy(self.counters.view(), self.counters_readback.view())
+    }
+
     /// Whether the sweep before has left rays that are not at their ends.
     pub fn remain(&self) -> Result<bool> {
         Ok(self.counters_readback.read::<Counters>(0, 1)?[0].remaining > 0)
@@ -103,7 +115,9 @@ impl PlaneRays {
                 instead: "choose another ray index".into(),
             });
         }
-        pass.fill(self.counters.view(), 0)?;
+        // The rays before have counted themselves.
+        pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_WRITE);
+        pass.fill(self.counters.slice(REMAINING, size_of::<u32>() as u64), 0)?;
         pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
         let (index, of_scene, own) = (scene.index_set(), scene.scene_set(), self.set());
         let sets: [&dyn BindingSet<'_>; 4] = [wave, &index, &of_scene, &own];

@@ -44,6 +44,8 @@ pub(in crate::techniques::photon_mapping) struct VolumePass {
     pub path_share: f32,
     /// Share of ways that have planes.
     pub plane_share: f32,
+    /// No two places of a body are farther apart, m.
+    pub body_reach: f32,
 }
 
 /// What photons in media are specialized to.
@@ -134,13 +136,14 @@ impl VolumeTrace {
                 stores_ways,
                 stores_planes,
             })?,
-            planes: match stores_planes {
-                true => Some(work(
-                    "photon planes",
-                    u64::from(slots) * size_of::<PlaneWords>() as u64,
-                )?),
-                false => None,
-            },
+            planes: stores_planes
+                .then(|| {
+                    work(
+                        "photon planes",
+                        u64::from(slots) * size_of::<PlaneWords>() as u64,
+                    )
+                })
+                .transpose()?,
             ways: if stores_ways {
                 let bytes = u64::from(slots) * size_of::<types::PhotonWay>() as u64;
                 Some([
@@ -230,6 +233,7 @@ impl VolumeTrace {
             pieces_most: self.pieces_most,
             classes: told.classes,
             plane_share: told.plane_share,
+            body_reach: told.body_reach,
             path_share: told.path_share,
             kernel,
         };
