@@ -33,7 +33,8 @@ float tap(ViewReceiver r, ivec2 at) {
 
 float visibility(ShadowQuery q) {
     ViewReceiver r = shadow_view_receiver(push.view, push.side, push.width, q.position, q.normal, q.slack);
-    if (!(r.distance > 0.0) || any(greaterThan(abs(r.place), vec2(1.0)))) {
+    bool is_shown = all(lessThanEqual(abs(shadow_view_place(push.view, q.position).xy), vec2(1.0)));
+    if (!(r.distance > 0.0) || !is_shown) {
         return 1.0;
     }
     vec2 place = (0.5 * r.place + 0.5) * float(push.side);
@@ -52,7 +53,7 @@ float visibility(ShadowQuery q) {
             weights += weight;
         }
     }
-    return sum / weights;
+    return sum == weights ? 1.0 : sum / weights;
 }
 
 void main() {

@@ -239,7 +239,12 @@ impl<'a> Pass<'a> {
             let is_fine = |area: &Area| targets.view_mask == 0 && area.is_in([WITHOUT_IMAGE_MAX; 2]);
             return match targets.area.filter(is_fine) {
                 Some(area) => Ok((area, 1)),
-                None => refuse(self.name, "the pass renders into no image".into()),
+                None => {
+                    let cause = format!(
+                        "the pass renders into no image, and not into an area of one view within {WITHOUT_IMAGE_MAX} pixels a side"
+                    );
+                    refuse(self.name, cause)
+                }
             };
         };
         let size = first.size();

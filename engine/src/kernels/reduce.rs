@@ -11,7 +11,7 @@ use crate::gpu::interface::{BindingSet, ComputeShader};
 use crate::gpu::shaders::constants::{FLOAT_INFINITY_BITS, FLOAT_SIGN_BIT};
 use crate::gpu::shaders::kernels::{reduce_box as box_kernel, reduce_words as words_kernel};
 use crate::gpu::shaders::types::StreamPlan;
-use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass};
+use crate::gpu::{Buffer, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::{Error, Result};
 
 /// A reduction of the stream by teams, then of what they found by one workgroup.
@@ -95,6 +95,13 @@ impl ReduceWords {
                 result_words: 2,
             },
         })
+    }
+
+    /// The kernels with their specialization.
+    pub fn pipelines(&self) -> Vec<PipelineInfo> {
+        let mut all = vec![self.stages.prepare.info()];
+        all.extend(self.stages.pipelines.iter().map(ComputePipeline::info));
+        all
     }
 
     /// Bytes of scratch memory for up to `capacity` words.

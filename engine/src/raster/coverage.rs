@@ -68,8 +68,19 @@ impl Coverage {
     /// # Errors
     /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub(crate) fn parts(&self, surfaces: &Surfaces<'_>, views: &[View], size: [u32; 2]) -> Result<Vec<DrawPart>> {
+        self.parts_at(1.0, surfaces, views, size)
+    }
+
+    /// As [`Coverage::parts`], of fragments each of which software devices take as long over as over `cost` of a picture.
+    pub(crate) fn parts_at(
+        &self,
+        cost: f64,
+        surfaces: &Surfaces<'_>,
+        views: &[View],
+        size: [u32; 2],
+    ) -> Result<Vec<DrawPart>> {
         let most = match self.gpu.caps().kind {
-            DeviceKind::Cpu => SOFTWARE_FRAGMENTS,
+            DeviceKind::Cpu => SOFTWARE_FRAGMENTS / cost,
             _ => DEVICE_FRAGMENTS,
         };
         let [width, height] = size.map(f64::from);

@@ -123,8 +123,9 @@ impl View {
         Ok(view.into_parallel(forward, 4.0 * half_side))
     }
 
-    /// The same in a target of `side` pixels a side, with a pixel more about it and all pixels moved by a part of one, from −½ to ½ across and down, so that over evenly
-    /// distributed shifts the rays of a pixel are even over the width of one. Everything lies before its origin by a pixel's width or more.
+    /// What parallel rays along a direction meet of surfaces in a target of `side` pixels a side: as [`View::of_beam`], in a square that is a pixel wider on each side, all pixels moved by a
+    /// part of one, from −½ to ½ across and down, so that over evenly distributed shifts the rays of a pixel are even over the width of one. Everything lies before its origin by a
+    /// pixel's width or more.
     ///
     /// # Errors
     /// As [`View::of_beam`].
@@ -132,7 +133,7 @@ impl View {
         let [lower, upper] = surfaces.bounds;
         let radius = 0.5 * f64::from((upper - lower).length());
         let radius = if radius > 0.0 { radius } else { 1.0 };
-        // Half of the pixels are as wide as the sphere and one pixel more.
+        // Half of the pixels are as wide as the radius and one pixel more.
         let pixel = 2.0 * radius / f64::from(side.saturating_sub(2).max(1));
         let half_side = 0.5 * f64::from(side) * pixel;
         let forward = direction.as_dvec3().normalize();

@@ -364,7 +364,8 @@ impl ViewShadowImage {
         let width = width.min(SHADOW_WIDTH_MAX).min(self.side);
         let surface = [place.position, place.normal].map(|v| v.as_dvec3());
         let r = shadow_view_receiver(&self.view, self.side, width, surface, place.slack.into());
-        if r.distance <= 0.0 || r.place.abs().max_element() > 1.0 {
+        let (shown, _) = shadow_view_place(&self.view, r.position);
+        if r.distance <= 0.0 || shown.abs().max_element() > 1.0 {
             return 1.0;
         }
         let at = (0.5 * r.place + 0.5) * f64::from(self.side);
@@ -378,14 +379,15 @@ impl ViewShadowImage {
             last if last == width => part,
             _ => 1.0,
         };
-        let mut sum = 0.0;
+        let (mut sum, mut weights) = (0.0, 0.0);
         for y in 0..=width {
             for x in 0..=width {
                 let share = weight(x, part.x) * weight(y, part.y);
                 sum += share * self.tap(&r, first + IVec2::new(x as i32, y as i32));
+                weights += share;
             }
         }
-        sum / f64::from(width * width)
+        sum / weights
     }
 
     fn tap(&self, r: &ViewReceiver, at: IVec2) -> f64 {

@@ -19,6 +19,9 @@ layout(set = 1, binding = 0, scalar) restrict buffer BundleCounts { uint bundle_
 layout(set = 1, binding = 1, scalar) restrict readonly buffer BundleStarts { uint bundle_starts[]; };
 layout(set = 1, binding = 2, scalar) restrict writeonly buffer BundleFragments { BundleFragment bundle_fragments[]; };
 
+// Fragments of a texel that are left, at most: more are below 0.
+const uint LEFT_MAX = 0x7FFFFFFFu;
+
 void main() {
     uint texel = bundle_texel(uvec2(gl_FragCoord.xy), BUNDLE_SIDE);
     if (!WRITES) {
@@ -26,10 +29,13 @@ void main() {
         return;
     }
     uint left = atomicAdd(bundle_counts[texel], 0xFFFFFFFFu);
-    // More than were counted: what is left is no 0, which the host sees.
-    if (left == 0u) {
+    // More than were counted: what is left is below 0, which the host sees.
+    if (left == 0u || left > LEFT_MAX) {
         return;
     }
-    RasterHit hit = raster_hit(raster_views[raster_view], load_triangle(raster_triangle), gl_FragCoord.xy);
-    bundle_fragments[bundle_starts[texel] + left - 1u] = BundleFragment(max(hit.distance, 0.0), raster_triangle, texel);
+    RasterView view = raster_views[raster_view];
+    SceneTriangle t = load_triangle(raster_triangle);
+    uint along = dot(cross(t.b - t.a, t.c - t.a), view.forward) > 0.0 ? BUNDLE_ALONG : 0u;
+    RasterHit hit = raster_hit(view, t, gl_FragCoord.xy);
+    bundle_fragments[bundle_starts[texel] + left - 1u] = BundleFragment(max(hit.distance, 0.0), raster_triangle | along, texel);
 }

@@ -2,7 +2,8 @@
 // Leads eye paths along the lines of a bundle: from where a path is to the next entry of its texel's list, in the sense of its direction.
 //
 // SVO-G6. Where the texel's line meets the plane of the surface that is left the way begins, so that this surface is not met again however steep it stands; entries of the same
-// triangle, and those that are nearer to the plane than rounding tells, are passed over. A path that meets nothing ends.
+// triangle, and those that are nearer to the plane than rounding tells, are passed over; within a texel's width of the plane also those that are met on the same side as the surface is
+// left, from behind: what is next to it where it is concave, beyond which the line begins. A path that meets nothing ends.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -21,6 +22,7 @@ layout(push_constant, scalar) uniform Push {
     uint first_pixel;
     uint end_pixel;
     float skipped;    // distance from the plane up to which entries are passed over, metres
+    float width;      // of a texel, the same of those from behind, metres
 } push;
 
 layout(set = 1, binding = 0, scalar) restrict readonly buffer BundleStarts { uint bundle_starts[]; };
@@ -39,16 +41,36 @@ uint bundle_first_beyond(uint first, uint end, float depth) {
     return first;
 }
 
-// The entry that a way meets, from a depth on by a line in one sense or the other; NO_HIT where it leaves. `own` is the triangle that it leaves.
-uint bundle_next(uvec2 list, float depth, float margin, bool deeper, uint own) {
+// Entries from behind that are passed over at most.
+const uint PASSED_MAX = 32u;
+
+// Where a way begins on the line.
+struct BundleStart {
+    float depth;
+    float margin;    // from there on nothing is met that is nearer than this
+    float behind;    // nor, from behind, than this
+    uint triangle;   // that is left, and BUNDLE_ALONG
+};
+
+bool is_passed(BundleEntry entry, BundleStart start) {
+    bool is_behind = abs(entry.depth - start.depth) <= start.behind && ((entry.triangle ^ start.triangle) & BUNDLE_ALONG) == 0u;
+    return is_behind || bundle_triangle(entry) == (start.triangle & ~BUNDLE_ALONG);
+}
+
+// The triangle that a way meets on the line, in one sense or the other; NO_HIT where it leaves.
+uint bundle_next(uvec2 list, BundleStart start, bool deeper) {
     if (deeper) {
-        uint next = bundle_first_beyond(list.x, list.y, depth + margin);
-        next += next < list.y && bundle_entries[next].triangle == own ? 1u : 0u;
-        return next < list.y ? bundle_entries[next].triangle : NO_HIT;
+        uint next = bundle_first_beyond(list.x, list.y, start.depth + start.margin);
+        for (uint passed = 0u; passed < PASSED_MAX && next < list.y && is_passed(bundle_entries[next], start); ++passed) {
+            ++next;
+        }
+        return next < list.y ? bundle_triangle(bundle_entries[next]) : NO_HIT;
     }
-    uint behind = bundle_first_beyond(list.x, list.y, depth - margin);
-    behind -= behind > list.x && bundle_entries[behind - 1u].triangle == own ? 1u : 0u;
-    return behind > list.x ? bundle_entries[behind - 1u].triangle : NO_HIT;
+    uint before = bundle_first_beyond(list.x, list.y, start.depth - start.margin);
+    for (uint passed = 0u; passed < PASSED_MAX && before > list.x && is_passed(bundle_entries[before - 1u], start); ++passed) {
+        --before;
+    }
+    return before > list.x ? bundle_triangle(bundle_entries[before - 1u]) : NO_HIT;
 }
 
 // Not a number for a triangle without area. Edges are scaled, so that the squares of small ones do not vanish.
@@ -80,13 +102,14 @@ void main() {
     vec3 normal = plane_normal(t);
     float cosine = dot(normal, view.forward);
     float depth = dot(normal, from - line) / cosine;
-    float margin = push.skipped / abs(cosine);
+    uint along = cosine > 0.0 ? BUNDLE_ALONG : 0u;
+    BundleStart start = BundleStart(depth, push.skipped / abs(cosine), push.width / abs(cosine), vertex.triangle | along);
     uint number = bundle_texel(texel, push.side);
     uvec2 list = uvec2(bundle_starts[number], bundle_starts[number + 1u]);
     bool deeper = dot(vertex.direction, view.forward) > 0.0;
     // Lines in the plane of the surface meet nothing.
-    bool is_crossed = abs(depth) <= FINITE_MAX && margin <= FINITE_MAX;
-    uint next = is_crossed ? bundle_next(list, depth, margin, deeper, vertex.triangle) : NO_HIT;
+    bool is_crossed = abs(depth) <= FINITE_MAX && start.behind <= FINITE_MAX;
+    uint next = is_crossed ? bundle_next(list, start, deeper) : NO_HIT;
     vertex.triangle = next;
     if (next != NO_HIT) {
         vertex.barycentrics = raster_hit(view, load_triangle(next), middle).weights.yz;

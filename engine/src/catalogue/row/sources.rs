@@ -22,8 +22,8 @@ sources! {
     BECKMANN_SPIZZICHINO_1963 = "beckmann-spizzichino-1963": "P. Beckmann, A. Spizzichino", "The Scattering of Electromagnetic Waves from Rough Surfaces", "Pergamon Press", 1963;
     BELLMAN_1961 = "bellman-1961": "R. Bellman", "On the Approximation of Curves by Line Segments Using Dynamic Programming", "CACM 4(6)", 1961;
     BITTERLI_2020 = "bitterli-2020": "B. Bitterli et al.", "Spatiotemporal Reservoir Resampling for Real-Time Ray Tracing with Dynamic Direct Lighting", "SIGGRAPH", 2020;
-    BJORKE_2004 = "bjorke-2004": "K. Bjorke", "Image-Based Lighting", "GPU Gems", 2004;
     BITTERLI_JAROSZ_2017 = "bitterli-jarosz-2017": "B. Bitterli, W. Jarosz", "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", "ACM TOG 36(4)", 2017;
+    BJORKE_2004 = "bjorke-2004": "K. Bjorke", "Image-Based Lighting", "GPU Gems", 2004;
     BLASI_1993 = "blasi-1993": "P. Blasi, B. Le Saëc, C. Schlick", "A Rendering Algorithm for Discrete Volume Density Objects", "CGF 12(3)", 1993;
     BLELLOCH_1990 = "blelloch-1990": "G. Blelloch", "Prefix Sums and Their Applications", "CMU-CS-90-190", 1990;
     BLINN_1977 = "blinn-1977": "J. Blinn", "Models of Light Reflection for Computer Synthesized Pictures", "SIGGRAPH", 1977;

@@ -21,7 +21,7 @@ use crate::{Error, Result};
 
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Consistent(
-    "lines go through the middles of texels, off by up to a half of one from where paths are: by edges between surfaces light leaks or is missing, on a strip as wide as a texel; the error falls with the width of texels",
+    "lines go through the middles of texels, off by up to a half of one from where paths are: by edges between surfaces light leaks or is missing, on a strip as wide as a texel, and so it does within bodies that are not much wider than some texels; the error falls with the width of texels",
 );
 
 const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "fragmentStoresAndAtomics"];
@@ -150,7 +150,7 @@ const ROWS: &[Row] = &[Row {
     id: "SVO-G6",
     name: "technique `ray-bundles`: eye paths along global ray-bundles, which one rasterization finds for all pixels at once",
     role: Role::Technique,
-    limits: "Diffuse scattering alone, up to four times; media, surfaces that let light through, unlit surfaces and kept instances are refused; light leaks at edges by the width of a texel; all pixels of a frame share its directions.",
+    limits: "Diffuse scattering alone, up to four times; media, surfaces that let light through, unlit surfaces and kept instances are refused; light leaks at edges by the width of a texel, through sheets that are nearer than one, and within small bodies; all pixels of a frame share its directions.",
     sources: &[
         sources::HERMES_2010.whole(),
         sources::TOKUYOSHI_OGAKI_2012.whole(),

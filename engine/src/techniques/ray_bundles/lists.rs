@@ -6,12 +6,13 @@
 use glam::{DVec2, Vec3};
 
 use crate::gpu::interface::ShaderInfo;
+use crate::gpu::shaders::constants::BUNDLE_ALONG;
 use crate::gpu::shaders::sets::RasterSet;
 use crate::gpu::shaders::techniques::ray_bundles::{bundle_frag, bundle_hop, bundle_sort, bundle_vert};
 use crate::gpu::shaders::types::{BundleEntry, BundleFragment, RasterView};
 use crate::gpu::{
     Access, Area, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, GraphicsDesc, GraphicsPipeline, Pass,
-    PipelineInfo, Recorder, SOFTWARE_LOOP_CAP, Targets,
+    PipelineInfo, Recorder, SOFTWARE_LOOP_CAP, Targets, wide_counter,
 };
 use crate::kernels::{Count, Form, Operation, ReduceWords, Scan, ScanBuffers, ScanOptions};
 use crate::raster::{Coverage, DrawPart, Surfaces, View};
@@ -40,6 +41,8 @@ pub struct LineHit {
     pub depth: f32,
     /// Number of the triangle.
     pub triangle: u32,
+    /// Its normal goes along the line.
+    pub along: bool,
 }
 
 /// Twin of `bundle_texel`: the number of a texel of a square of `side` texels.
@@ -84,9 +87,14 @@ pub(super) struct Counted {
 
 type Draws = GraphicsPipeline<bundle_vert::Shader, bundle_frag::Shader>;
 
-/// Words of what the host reads: the longest list in two, all entries, what is left in two.
-const READ_WORDS: u64 = 5;
+/// Words of what the host reads, two for each: the longest list, all entries, what the second drawing has left.
+const READ_WORDS: u64 = 6;
+const LONGEST: u64 = 0;
+const ENTRIES: u64 = 2;
+const LEFT: u64 = 4;
 const WORD: u64 = size_of::<u32>() as u64;
+/// What a fragment that counts and writes itself takes, over one of a picture: software devices draw some fifty million of them a second.
+const FRAGMENT_COST: f64 = 60.0;
 
 /// Makes the lists of one bundle at a time.
 pub(super) struct Lists {
@@ -97,6 +105,7 @@ pub(super) struct Lists {
     write: Draws,
     scan: Scan,
     most: ReduceWords,
+    sum: ReduceWords,
     sort: ComputePipeline<bundle_sort::Kernel>,
     hop: ComputePipeline<bundle_hop::Kernel>,
     views: Buffer,
@@ -105,7 +114,7 @@ pub(super) struct Lists {
     fragments: Buffer,
     entries: Buffer,
     scan_scratch: Buffer,
-    most_scratch: Buffer,
+    reduce_scratch: Buffer,
     result: Buffer,
     readback: Buffer,
     /// The bundle that was sorted last, and its entries.
@@ -132,7 +141,8 @@ impl Lists {
             })
         };
         let scan = Scan::new(gpu, ScanOptions::default())?;
-        let most = ReduceWords::new(gpu, Operation::Max, Form::default())?;
+        let reduce = |operation| ReduceWords::new(gpu, operation, Form::default());
+        let (most, sum) = (reduce(Operation::Max)?, reduce(Operation::Sum)?);
         let words = words_of(side);
         let buffer = |name, bytes| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
         Ok(Self {
@@ -149,11 +159,15 @@ impl Lists {
             fragments: buffer("bundle fragments", 0)?,
             entries: buffer("bundle entries", 0)?,
             scan_scratch: buffer("bundle scan", scan.scratch_bytes(words))?,
-            most_scratch: buffer("bundle reduction", most.scratch_bytes(words))?,
-            result: buffer("bundle longest", 2 * WORD)?,
+            reduce_scratch: buffer(
+                "bundle reduction",
+                most.scratch_bytes(words).max(sum.scratch_bytes(words)),
+            )?,
+            result: buffer("bundle counted", 2 * WORD)?,
             readback: gpu.buffer(&BufferDesc::readback("bundle counted", READ_WORDS * WORD))?,
             scan,
             most,
+            sum,
             last: None,
         })
     }
@@ -162,6 +176,7 @@ impl Lists {
         let mut all = self.count.info();
         all.extend(self.write.info());
         all.extend(self.scan.pipelines());
+        all.extend([&self.most, &self.sum].into_iter().flat_map(ReduceWords::pipelines));
         all.extend([self.sort.info(), self.hop.info()]);
         all
     }
@@ -174,7 +189,7 @@ impl Lists {
             &self.fragments,
             &self.entries,
             &self.scan_scratch,
-            &self.most_scratch,
+            &self.reduce_scratch,
         ];
         all.map(Buffer::bytes).iter().sum()
     }
@@ -187,7 +202,7 @@ impl Lists {
     /// Parts that each of the drawings of a bundle falls in.
     pub fn parts(&self, surfaces: &Surfaces<'_>, view: &View) -> Result<Vec<DrawPart>> {
         self.coverage
-            .parts(surfaces, std::slice::from_ref(view), [self.side; 2])
+            .parts_at(FRAGMENT_COST, surfaces, std::slice::from_ref(view), [self.side; 2])
     }
 
     fn raster_set<'a>(&'a self, surfaces: &Surfaces<'a>) -> RasterSet<'a> {
@@ -231,11 +246,10 @@ impl Lists {
         })
     }
 
-    /// Records the greatest of the counts, for the host to read from that word on.
-    fn record_most(&self, pass: &mut Pass<'_>, word: u64) -> Result<()> {
+    /// Records what a reduction makes of the counts, for the host to read from that word on.
+    fn record_reduced(&self, pass: &mut Pass<'_>, reduce: &ReduceWords, word: u64) -> Result<()> {
         let (words, result) = (Count::Host(words_of(self.side)), self.result.view());
-        self.most
-            .record(pass, self.counts.view(), result, words, &self.most_scratch)?;
+        reduce.record(pass, self.counts.view(), result, words, &self.reduce_scratch)?;
         after_all(pass);
         pass.copy(
             self.result.slice(0, 2 * WORD),
@@ -274,23 +288,24 @@ impl Lists {
             self.scan
                 .record(pass, &buffers, Count::Host(words), &self.scan_scratch)?;
             after_all(pass);
-            self.record_most(pass, 0)?;
+            self.record_reduced(pass, &self.most, LONGEST)?;
             after_all(pass);
-            let all = self.starts.slice(WORD * u64::from(words - 1), WORD);
-            pass.copy(all, self.readback.slice(2 * WORD, WORD))
+            self.record_reduced(pass, &self.sum, ENTRIES)
         })
     }
 
     /// What the drawing whose submission is over has counted.
     ///
     /// # Errors
-    /// [`Error::Overflow`] for a list that is longer than [`LIST_MAX`].
+    /// [`Error::Overflow`] for a list that is longer than [`LIST_MAX`], or more entries than a storage buffer of the device holds.
     pub fn counted(&self) -> Result<Counted> {
-        let words: Vec<u32> = self.readback.read(0, 3)?;
+        let words: Vec<u32> = self.readback.read(0, READ_WORDS as usize)?;
+        let word = |place: u64| words[place as usize];
         let counted = Counted {
-            entries: words[2],
-            longest: words[0],
+            entries: word(ENTRIES),
+            longest: word(LONGEST),
         };
+        self.check_entries(wide_counter([word(ENTRIES), word(ENTRIES + 1)]))?;
         if counted.longest > LIST_MAX {
             return Err(Error::Overflow {
                 kernel: bundle_sort::INFO.name.into(),
@@ -303,28 +318,39 @@ impl Lists {
         Ok(counted)
     }
 
-    /// Makes room for so many entries; true where there was none before.
+    /// Fails for more entries than there can be room for.
+    fn check_entries(&self, needed: u64) -> Result<()> {
+        let capacity = self.entries_max();
+        if needed <= capacity {
+            return Ok(());
+        }
+        Err(Error::Overflow {
+            kernel: bundle_frag::INFO.name.into(),
+            what: "entries of a bundle's lists".into(),
+            needed,
+            capacity,
+            instead: "set a smaller `raster`".into(),
+        })
+    }
+
+    /// Entries that a storage buffer of the device holds, each as it is drawn.
+    fn entries_max(&self) -> u64 {
+        let most = self.gpu.caps().max_storage_buffer_range / size_of::<BundleFragment>() as u64;
+        most.min(u32::MAX.into())
+    }
+
+    /// Makes room for so many entries, which are counted; true where there was none before.
     ///
     /// # Errors
-    /// [`Error::Overflow`] for more than a storage buffer of the device holds, [`Error::OutOfMemory`].
+    /// [`Error::OutOfMemory`].
     pub fn make_room(&mut self, entries: u32) -> Result<bool> {
         let each = size_of::<BundleFragment>() as u64;
         let (needed, has) = (u64::from(entries), self.fragments.bytes() / each);
         if needed <= has {
             return Ok(false);
         }
-        let most = self.gpu.caps().max_storage_buffer_range / each;
-        if needed > most {
-            return Err(Error::Overflow {
-                kernel: bundle_frag::INFO.name.into(),
-                what: "entries of a bundle's lists".into(),
-                needed,
-                capacity: most,
-                instead: "set a smaller `raster`".into(),
-            });
-        }
         // Bundles of other directions have more.
-        let room = (needed + needed / 4).min(most);
+        let room = (needed + needed / 4).min(self.entries_max());
         let buffer = |name, each| self.gpu.buffer(&BufferDesc::storage(name, room * each, Category::Work));
         self.fragments = buffer("bundle fragments", each)?;
         self.entries = buffer("bundle entries", size_of::<BundleEntry>() as u64)?;
@@ -338,7 +364,7 @@ impl Lists {
             self.record_draw(pass, &self.write, surfaces, part)?;
             if part.ends {
                 after_all(pass);
-                self.record_most(pass, 3)?;
+                self.record_reduced(pass, &self.most, LEFT)?;
             }
             Ok(())
         })
@@ -349,7 +375,7 @@ impl Lists {
     /// # Errors
     /// [`Error::Internal`].
     pub fn check_written(&self) -> Result<()> {
-        let left: Vec<u32> = self.readback.read(3 * WORD, 1)?;
+        let left: Vec<u32> = self.readback.read(LEFT * WORD, 1)?;
         if left[0] == 0 {
             return Ok(());
         }
@@ -377,9 +403,9 @@ impl Lists {
         })
     }
 
-    /// Notes that the lists of a bundle are there.
-    pub fn keep(&mut self, view: View, entries: u32) {
-        self.last = Some((view, entries));
+    /// Notes that the lists of a bundle are there, or that others are being made.
+    pub fn keep(&mut self, bundle: Option<(View, u32)>) {
+        self.last = bundle;
     }
 
     /// Records the way of eye paths along the lines of the bundle. `skipped`: distance from a surface's plane up to which entries are passed over, in texels.
@@ -406,6 +432,7 @@ impl Lists {
                 first_pixel: 0,
                 end_pixel: pixels,
                 skipped: skipped * texel,
+                width: texel,
             };
             let raster = self.raster_set(&surfaces);
             let groups = self.hop.groups_over(pixels);
@@ -422,7 +449,8 @@ impl Lists {
         let entries: Vec<BundleEntry> = self.gpu.read(self.entries.view(), entries as usize)?;
         let hit = |entry: &BundleEntry| LineHit {
             depth: entry.depth,
-            triangle: entry.triangle,
+            triangle: entry.triangle & !BUNDLE_ALONG,
+            along: entry.triangle & BUNDLE_ALONG != 0,
         };
         Ok(Some(BundleLists {
             view,

@@ -14,8 +14,10 @@
 //! # Consistent
 //!
 //! A texel's line stands for all ways through the texel: it is moved by up to a half of a texel from where the path is. The way begins where that line meets the plane of the surface that is left, so that
-//! this surface is never met again. Squares are moved by a part of a texel from bundle to bundle, so that over many the lines of a point are even about it, and where light changes evenly nothing is
-//! wrong; within a texel of edges between surfaces, lines begin beyond the edge, and light leaks. The error falls with the width of texels.
+//! this surface is never met again. Squares are moved by a part of a texel from bundle to bundle, so that over many the lines of a point are even about it, and on plane surfaces
+//! on which light changes evenly nothing is wrong. Within a texel of edges between surfaces lines begin beyond the edge, and light leaks. Concave surfaces are all edges: a line begins behind what is next to the
+//! place that is left, so that within a texel's width what is met from behind is passed over, which takes a sheet there for nothing. A sphere that is some 18 texels wide loses a hundredth of the light of each bundle.
+//! The error falls with the width of texels.
 //!
 //! Guarantees: deterministic in settings and seed, on any number of threads; all pixels of a frame have its directions, so that they share noise, and with one seed a sequence that is
 //! even over frames. Refused are participating media, surfaces that let light through, unlit ones, and scenes that keep their instances.

@@ -130,6 +130,13 @@ fn at_once(pieces: u32, parts: u32) -> u32 {
     pieces.div_ceil(parts.max(1)).max(1)
 }
 
+fn no_bundle() -> Error {
+    Error::Internal {
+        what: "ray-bundles".into(),
+        fault: "go on along a bundle that there is not".into(),
+    }
+}
+
 impl RayBundles {
     /// Prepares a rendering of `size` pixels.
     ///
@@ -243,7 +250,7 @@ impl RayBundles {
         self.vertices.bytes() + self.lists.as_ref().map_or(0, Lists::bytes)
     }
 
-    /// The lists of the last bundle; `None` before the first one.
+    /// The lists of the last bundle of the last frame; `None` before the first one is whole, and while another is under way.
     ///
     /// # Errors
     /// [`Error::DeviceLost`], [`Error::OutOfMemory`].
@@ -293,12 +300,16 @@ impl RayBundles {
         }
         let mut frame = match self.frame.take() {
             Some(frame) => frame,
-            None => self.begin_frame()?,
+            None => {
+                self.keep(None);
+                self.begin_frame()?
+            }
         };
         let timings = self.advance(&mut frame)?;
         if frame.stage == Stage::Ended {
             self.done += 1;
             self.counts.frames += 1;
+            self.keep(frame.bundle);
         } else {
             self.frame = Some(frame);
         }
@@ -308,6 +319,13 @@ impl RayBundles {
             done: pixels * u64::from(self.done),
             wanted: pixels * u64::from(samples),
         }))
+    }
+
+    /// Notes whose lists there are.
+    fn keep(&mut self, bundle: Option<Bundle>) {
+        if let Some(lists) = &mut self.lists {
+            lists.keep(bundle.map(|bundle| (bundle.view, bundle.counted.entries)));
+        }
     }
 
     /// The picture so far.
@@ -382,7 +400,7 @@ impl RayBundles {
     /// Makes room for what the first drawing has counted.
     fn read_counts(&mut self, frame: &mut Frame, bounce: u32) -> Result<Stage> {
         let (Some(lists), Some(bundle)) = (&mut self.lists, &mut frame.bundle) else {
-            return Ok(Stage::Film);
+            return Err(no_bundle());
         };
         bundle.counted = lists.counted()?;
         let Counted { entries, longest } = bundle.counted;
@@ -390,7 +408,6 @@ impl RayBundles {
         self.counts.bundles += 1;
         self.counts.entries += u64::from(entries);
         self.counts.longest = self.counts.longest.max(longest.into());
-        lists.keep(bundle.view, entries);
         Ok(Stage::Write { bounce, part: 0 })
     }
 
@@ -421,9 +438,7 @@ impl RayBundles {
                 Ok((next, self.pixels_at_once >= pixels))
             }
             Stage::Count { bounce, part } => {
-                let (Some(lists), Some(bundle)) = (&self.lists, &frame.bundle) else {
-                    return Ok((Stage::Film, true));
-                };
+                let (lists, bundle) = self.bundle_of(frame)?;
                 let drawn = &bundle.parts[part];
                 lists.record_count(recorder, &self.scene.surfaces(), &bundle.view, drawn)?;
                 Ok(if drawn.ends {
@@ -433,9 +448,7 @@ impl RayBundles {
                 })
             }
             Stage::Write { bounce, part } => {
-                let (Some(lists), Some(bundle)) = (&self.lists, &frame.bundle) else {
-                    return Ok((Stage::Film, true));
-                };
+                let (lists, bundle) = self.bundle_of(frame)?;
                 let drawn = &bundle.parts[part];
                 lists.record_write(recorder, &self.scene.surfaces(), drawn)?;
                 let next = match (drawn.ends, bundle.counted.entries) {
@@ -446,9 +459,7 @@ impl RayBundles {
                 Ok((next, bundle.parts.len() == 1))
             }
             Stage::Sort { bounce, fragment } => {
-                let (Some(lists), Some(bundle)) = (&self.lists, &frame.bundle) else {
-                    return Ok((Stage::Film, true));
-                };
+                let (lists, bundle) = self.bundle_of(frame)?;
                 let Counted { entries, longest } = bundle.counted;
                 let work = u64::from(entries) * u64::from(longest);
                 let most = at_once(entries, Part::count(&self.gpu, work).max(self.settings.parts));
@@ -462,9 +473,7 @@ impl RayBundles {
                 Ok((next, most >= entries))
             }
             Stage::Hop { bounce } => {
-                let (Some(lists), Some(bundle)) = (&self.lists, &frame.bundle) else {
-                    return Ok((Stage::Film, true));
-                };
+                let (lists, bundle) = self.bundle_of(frame)?;
                 let along = (&bundle.view, self.settings.skipped);
                 lists.record_hop(recorder, &self.scene, along, self.vertices.view(), pixels)?;
                 let next = Stage::Shade {
@@ -473,11 +482,18 @@ impl RayBundles {
                 };
                 Ok((next, true))
             }
-            Stage::Film | Stage::Counted { .. } | Stage::Ended => {
+            Stage::Film => {
                 self.film.record_frame(recorder, &self.radiance)?;
                 Ok((Stage::Ended, false))
             }
+            // Nothing is recorded of these.
+            Stage::Counted { .. } | Stage::Ended => Ok((frame.stage, false)),
         }
+    }
+
+    /// The lists, and the bundle under way.
+    fn bundle_of<'a>(&'a self, frame: &'a Frame) -> Result<(&'a Lists, &'a Bundle)> {
+        self.lists.as_ref().zip(frame.bundle.as_ref()).ok_or_else(no_bundle)
     }
 
     /// The bundle behind so many scatterings. May wait for the device.
