@@ -123,14 +123,13 @@ impl View {
         Ok(view.into_parallel(forward, 4.0 * half_side))
     }
 
-    /// What parallel rays along a direction meet of surfaces in a target of `side` pixels a side: as [`View::of_beam`], in a square that is a pixel wider on each side, all pixels moved by a
+    /// What parallel rays along a direction meet of surfaces within bounds, in a target of `side` pixels a side: as [`View::of_beam`], in a square that is a pixel wider on each side, all pixels moved by a
     /// part of one, from −½ to ½ across and down, so that over evenly distributed shifts the rays of a pixel are even over the width of one. Everything lies before its origin by a
     /// pixel's width or more.
     ///
     /// # Errors
     /// As [`View::of_beam`].
-    pub(crate) fn of_shifted_beam(direction: Vec3, surfaces: &Surfaces<'_>, side: u32, shift: DVec2) -> Result<Self> {
-        let [lower, upper] = surfaces.bounds;
+    pub(crate) fn of_shifted_beam(direction: Vec3, [lower, upper]: [Vec3; 2], side: u32, shift: DVec2) -> Result<Self> {
         let radius = 0.5 * f64::from((upper - lower).length());
         let radius = if radius > 0.0 { radius } else { 1.0 };
         // Half of the pixels are as wide as the radius and one pixel more.
@@ -310,6 +309,35 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shifted_beams_hold_their_bounds_and_are_moved_by_parts_of_a_pixel() {
+        let bounds = [Vec3::new(-1.0, 0.5, 2.0), Vec3::new(2.0, 1.0, 4.0)];
+        let corners = [0usize, 1, 2, 3, 4, 5, 6, 7].map(|corner| {
+            let at = |axis: usize| bounds[corner >> axis & 1][axis];
+            Vec3::new(at(0), at(1), at(2)).as_dvec3()
+        });
+        for direction in [Vec3::Y, Vec3::new(0.3, -0.5, 0.8), Vec3::new(-1.0, 1e-3, 0.0)] {
+            for side in [16, 33, 256] {
+                let of = |x, y| View::of_shifted_beam(direction, bounds, side, DVec2::new(x, y)).expect("view");
+                let still = of(0.0, 0.0);
+                let pixel = 2.0 * still.axes()[0].length() / side as f32;
+                for (x, y) in [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (0.25, 0.0)] {
+                    let moved = of(x, y);
+                    for corner in corners {
+                        let [u, v, ..] = moved.project(corner);
+                        assert!(u.abs() <= 1.0 && v.abs() <= 1.0, "{direction} {side}: {u} {v}");
+                        let from = (corner - moved.origin().as_dvec3()).dot(direction.as_dvec3().normalize());
+                        assert!(from > 0.99 * f64::from(pixel), "{direction} {side}: {from}");
+                    }
+                    // A pixel's ray is that of a place between pixels.
+                    let [a, b] = [moved.ray(3.5, 4.5), still.ray(3.5 + x as f32, 4.5 + y as f32)];
+                    let off = Vec3::from_array(a.origin) - Vec3::from_array(b.origin);
+                    assert!(off.length() < 1e-2 * pixel, "{direction} {side}: {off}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn oblique_near_planes_keep_pixels_and_the_order_of_depths() {

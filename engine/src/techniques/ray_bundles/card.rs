@@ -169,6 +169,7 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/bidirectional/ray_bundles.rs::threads_and_widths_of_the_driver_never_show",
         "tests/tests/bidirectional/ray_bundles.rs::how_work_is_shared_out_never_shows",
         "tests/tests/bidirectional/ray_bundles.rs::what_cannot_be_is_refused_by_name",
+        "engine/src/raster/view.rs::shifted_beams_hold_their_bounds_and_are_moved_by_parts_of_a_pixel",
         "engine/src/techniques/ray_bundles/settings.rs::path_sets_are_ranges_of_up_to_four_diffuse_bounces",
     ],
     api: &["clerestory::techniques::ray_bundles::RayBundles"],

@@ -196,7 +196,7 @@ impl Lists {
 
     /// The bundle of a direction of length 1, moved by a part of a texel.
     pub fn view(&self, direction: Vec3, surfaces: &Surfaces<'_>, shift: DVec2) -> Result<View> {
-        View::of_shifted_beam(direction, surfaces, self.side, shift)
+        View::of_shifted_beam(direction, surfaces.bounds, self.side, shift)
     }
 
     /// Parts that each of the drawings of a bundle falls in.
