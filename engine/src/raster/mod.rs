@@ -44,6 +44,7 @@ pub use output::Output;
 pub use pipelines::Layering;
 pub use surfaces::{ObjectTriangles, SurfaceFeatures, Surfaces};
 pub use view::View;
+pub(crate) use view_shadow::shadow_view;
 pub use view_shadow::{
     ViewReceiver, ViewShadowDesc, ViewShadowImage, ViewShadowMaps, shadow_view_place, shadow_view_ray,
     shadow_view_receiver, shadow_view_threshold,

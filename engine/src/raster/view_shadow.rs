@@ -19,7 +19,7 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{SHADOW_FOLD, SHADOW_MOVE_MAX, SHADOW_ROUNDING};
 use crate::gpu::shaders::raster::view_shadow_look_up as kernel;
 use crate::gpu::shaders::types::{ShadowQuery, ShadowView};
-use crate::gpu::{Access, Area, Buffer, BufferBarrier, BufferDesc, Category, Gpu, PipelineInfo, Recorder};
+use crate::gpu::{Access, Area, Buffer, BufferBarrier, BufferDesc, BufferView, Category, Gpu, PipelineInfo, Recorder};
 use crate::scene::LightKind;
 use crate::{Error, Result};
 
@@ -42,6 +42,31 @@ pub struct ViewShadowDesc {
 impl ViewShadowDesc {
     fn texels(&self) -> u64 {
         u64::from(self.side) * u64::from(self.side)
+    }
+
+    /// Bytes of all maps.
+    ///
+    /// # Errors
+    /// As [`ViewShadowMaps::new`].
+    pub(crate) fn check(&self, gpu: &Gpu) -> Result<u64> {
+        if self.side == 0 || self.maps == 0 || self.maps > SHADOW_MAPS_MAX {
+            let value = format!("{} of side {}", self.maps, self.side);
+            let cause = format!("are none, or more than {SHADOW_MAPS_MAX}");
+            return Err(Error::setting("shadow maps", value, cause));
+        }
+        let bytes = (self.texels())
+            .saturating_mul(u64::from(self.maps))
+            .saturating_mul(size_of::<f32>() as u64);
+        let limit = gpu.caps().max_storage_buffer_range;
+        if bytes > limit {
+            return Err(Error::LimitExceeded {
+                name: "shadow maps of views".into(),
+                value: bytes,
+                limit_name: "maxStorageBufferRange",
+                limit,
+            });
+        }
+        Ok(bytes)
     }
 }
 
@@ -82,7 +107,8 @@ fn view_of(light: &LightKind, surfaces: &Surfaces<'_>, side: u32) -> Result<View
     }
 }
 
-fn record_of(view: &View) -> ShadowView {
+/// What kernels know of a view.
+pub(crate) fn shadow_view(view: &View) -> ShadowView {
     let [right, down, forward] = view.axes().map(|axis| axis.to_array());
     ShadowView {
         origin: view.origin().to_array(),
@@ -100,14 +126,7 @@ impl ViewShadowMaps {
     /// [`Error::Setting`] for no texels, or maps other than 1 to [`SHADOW_MAPS_MAX`] in number; [`Error::LimitExceeded`] for more than a storage buffer or an image holds;
     /// [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, surfaces: &Surfaces<'_>, desc: ViewShadowDesc) -> Result<Self> {
-        if desc.side == 0 || desc.maps == 0 || desc.maps > SHADOW_MAPS_MAX {
-            let value = format!("{} of side {}", desc.maps, desc.side);
-            let cause = format!("are none, or more than {SHADOW_MAPS_MAX}");
-            return Err(Error::setting("shadow maps", value, cause));
-        }
-        let bytes = (desc.texels())
-            .saturating_mul(u64::from(desc.maps))
-            .saturating_mul(size_of::<f32>() as u64);
+        let bytes = desc.check(gpu)?;
         let distances = gpu.buffer(&BufferDesc::storage("shadow maps of views", bytes, Category::Light))?;
         let gbuffer = GBuffer::new(
             gpu,
@@ -157,29 +176,58 @@ impl ViewShadowMaps {
             let cause = format!("are more than the {} shadow maps", self.desc.maps);
             return Err(Error::setting("lights", lights.len(), cause));
         }
-        let bytes = self.desc.texels() * size_of::<f32>() as u64;
-        for (map, light) in (0u64..).zip(lights) {
-            let view = view_of(light, surfaces, self.desc.side)?;
-            let whole = DrawPart::whole(surfaces);
-            self.gbuffer.record_part(recorder, surfaces, &[view], &whole)?;
-            let barrier = |from, to| BufferBarrier {
-                buffer: &self.distances,
-                from,
-                to,
-            };
-            recorder.pass("shadow maps of views: distances", |pass| {
-                let Some(image) = self.gbuffer.image(Output::Distance) else {
-                    return Ok(());
-                };
-                pass.barrier(&[barrier(Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
-                let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-                self.gbuffer.barrier_to(pass, Access::TRANSFER_READ, source);
-                pass.copy_image_to_buffer(image, self.distances.slice(map * bytes, bytes))?;
-                pass.barrier(&[barrier(Access::TRANSFER_WRITE, Access::COMPUTE_READ)]);
-                Ok(())
-            })?;
+        for (map, light) in (0..).zip(lights) {
+            let view = self.view(surfaces, light)?;
+            self.record_part(recorder, surfaces, map, &view, &DrawPart::whole(surfaces))?;
         }
         Ok(())
+    }
+
+    /// From where the map of a light is drawn.
+    ///
+    /// # Errors
+    /// As [`ViewShadowMaps::record`].
+    pub(crate) fn view(&self, surfaces: &Surfaces<'_>, light: &LightKind) -> Result<View> {
+        view_of(light, surfaces, self.desc.side)
+    }
+
+    /// As [`ViewShadowMaps::record`], a part of one map, which is there after the last part.
+    pub(crate) fn record_part(
+        &self,
+        recorder: &mut Recorder,
+        surfaces: &Surfaces<'_>,
+        map: u32,
+        view: &View,
+        part: &DrawPart,
+    ) -> Result<()> {
+        self.check(map)?;
+        self.gbuffer
+            .record_part(recorder, surfaces, std::slice::from_ref(view), part)?;
+        if !part.ends {
+            return Ok(());
+        }
+        let barrier = |from, to| BufferBarrier {
+            buffer: &self.distances,
+            from,
+            to,
+        };
+        let bytes = self.desc.texels() * size_of::<f32>() as u64;
+        recorder.pass("shadow maps of views: distances", |pass| {
+            let Some(image) = self.gbuffer.image(Output::Distance) else {
+                return Ok(());
+            };
+            pass.barrier(&[barrier(Access::COMPUTE_READ, Access::TRANSFER_WRITE)]);
+            let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+            self.gbuffer.barrier_to(pass, Access::TRANSFER_READ, source);
+            pass.copy_image_to_buffer(image, self.distances.slice(u64::from(map) * bytes, bytes))?;
+            pass.barrier(&[barrier(Access::TRANSFER_WRITE, Access::COMPUTE_READ)]);
+            Ok(())
+        })
+    }
+
+    /// What kernels that look up read.
+    pub(crate) fn distances(&self) -> BufferView<'_> {
+        self.distances.view()
     }
 
     /// Shares of a light's light that reach places, by the device: the number of its map, and the filter's width in texels (0 for none, [`SHADOW_WIDTH_MAX`] and the map's side at
@@ -222,7 +270,7 @@ impl ViewShadowMaps {
             };
             let count = places.len() as u32;
             let push = kernel::Push {
-                view: record_of(&view),
+                view: shadow_view(&view),
                 count,
                 map,
                 side: self.desc.side as i32,
@@ -245,7 +293,7 @@ impl ViewShadowMaps {
         let bytes = texels * size_of::<f32>() as u64;
         let of_map = self.distances.slice(u64::from(map) * bytes, bytes);
         Ok(ViewShadowImage {
-            view: record_of(&view),
+            view: shadow_view(&view),
             side: self.desc.side,
             distances: self.gpu.read(of_map, texels as usize)?,
         })
@@ -415,6 +463,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     ],
     shaders: &[
         "shaders/raster/view_shadow.glsl",
+        "shaders/raster/view_shadow_set.glsl",
         "shaders/raster/view_shadow_look_up.comp",
         "shaders/raster/shadow_query.glsl",
         "shaders/raster/surface.vert",

@@ -14,9 +14,11 @@ layout(local_size_x = 64) in;
 layout(constant_id = 140) const bool SEES_ALL_DIRECTIONS = false;
 layout(constant_id = 141) const bool HAS_PROBE = true;
 layout(constant_id = 142) const bool HAS_SHADOWS = true;
+layout(constant_id = 143) const bool HAS_SUN_SHADOWS = true;
 
 #include "invocation.glsl"
 #include "raster/omni_shadow_set.glsl"
+#include "raster/view_shadow.glsl"
 #include "scene/bindings.glsl"
 #include "techniques/preview/frame.glsl"
 #include "techniques/preview/probe.glsl"
@@ -25,9 +27,14 @@ layout(constant_id = 142) const bool HAS_SHADOWS = true;
 layout(set = 0, binding = 0) uniform usampler2D seen_triangles;
 layout(set = 0, binding = 1) uniform sampler2D seen_weights;
 layout(set = 0, binding = 2, scalar) restrict readonly buffer Frames { PreviewFrame frames[]; };
-// The word `spare` is the number of the light's shadow map.
+// The word `spare` is the number of the light's shadow map among those of its kind.
 layout(set = 0, binding = 3, scalar) restrict readonly buffer Lights { SceneLight lights[]; };
 layout(set = 0, binding = 4, scalar) restrict writeonly buffer Radiance { vec3 radiance[]; };
+// Shadow maps of directional lights.
+layout(set = 0, binding = 5, scalar) restrict readonly buffer SunViews { ShadowView sun_views[]; };
+layout(set = 0, binding = 6, scalar) restrict readonly buffer ViewDistances { float view_distances[]; };
+
+#include "raster/view_shadow_set.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint frame;
@@ -63,9 +70,14 @@ vec3 preview_direct(uint index, Surface s, Bsdf b, mat3 axes, vec3 facing, vec3 
         return vec3(0.0);
     }
     vec3 reflected = arriving * bsdf_eval(b, wo, wi, LOBE_REFLECTION);
-    if (HAS_SHADOWS && light.spare != PREVIEW_NO_SHADOW && reflected != vec3(0.0)) {
+    if (light.spare != PREVIEW_NO_SHADOW && reflected != vec3(0.0)) {
         float slack = dot(abs(facing), s.point.error);
-        reflected *= omni_shadow_visibility(light.spare, frames[push.frame].shadow_side, light.position, s.point.position, facing, slack);
+        int side = frames[push.frame].shadow_side;
+        if (HAS_SUN_SHADOWS && is_distant) {
+            reflected *= view_shadow_visibility(sun_views[light.spare], light.spare, side, SHADOW_WIDTH, s.point.position, facing, slack);
+        } else if (HAS_SHADOWS) {
+            reflected *= omni_shadow_visibility(light.spare, side, light.position, s.point.position, facing, slack);
+        }
     }
     return reflected;
 }

@@ -212,6 +212,7 @@ fn preview(gpu: &Gpu, scene: &GpuScene) -> Preview {
             layout: ShadowLayout::Cube,
             side: 64,
             width: 1,
+            suns: 0,
         }),
         has_probes: false,
     };

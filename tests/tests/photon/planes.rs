@@ -52,7 +52,7 @@ fn planes_agree_with_the_path_tracer_without_blur() {
         };
         // The sphere stands between many of the places of two flights.
         for scene in [
-            lit_box(coloured),
+            lit_box(coloured.clone()),
             builtin("builtin:fog-box?boxes=none"),
             builtin("builtin:fog-box?sphere=glass&sigma_s=3"),
         ] {
@@ -65,7 +65,12 @@ fn planes_agree_with_the_path_tracer_without_blur() {
             alpha_mode: AlphaMode::Blend,
             ..Material::lambert("holes", Vec3::ZERO)
         });
-        sheet.place(cuboid("sheet", holes, Vec3::new(-0.2, -0.3, -0.3), Vec3::new(-0.19, 0.3, 0.3)));
+        sheet.place(cuboid(
+            "sheet",
+            holes,
+            Vec3::new(-0.2, -0.3, -0.3),
+            Vec3::new(-0.19, 0.3, 0.3),
+        ));
         for scene in [lit_box(coloured), sheet] {
             let shared = PhotonSettings {
                 volume_radius: 0.0,

@@ -262,6 +262,7 @@ fn direct_light_is_the_path_tracers() {
                     layout,
                     side: layout.side_for(6 * 256 * 256),
                     width: 1,
+                    suns: 1,
                 };
                 let found = pixels(&picture(gpu, &scene, 8, Some(shadows)));
                 let mut off = Vec::new();
@@ -275,9 +276,7 @@ fn direct_light_is_the_path_tracers() {
                 println!("{light:?}, {}: median {median:.2e}, 97 % {high:.2e}", layout.name());
                 // Pixels of one surface differ by where samples lie; those with edges by the noise of samples.
                 assert!(median < 0.01, "{light:?}, {}: {median}", layout.name());
-                // A directional light casts no shadow here.
-                let casts = !matches!(light, LightKind::Directional { .. });
-                assert!(!casts || high < 0.25, "{light:?}, {}: {high}", layout.name());
+                assert!(high < 0.25, "{light:?}, {}: {high}", layout.name());
             }
         }
     });

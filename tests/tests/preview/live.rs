@@ -258,6 +258,7 @@ fn other_previews_and_scenes_are_refused() {
                     layout,
                     side: 16,
                     width,
+                    suns: 0,
                 }),
                 has_probes: false,
             };

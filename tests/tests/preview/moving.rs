@@ -23,6 +23,7 @@ const DESC: PreviewDesc = PreviewDesc {
         layout: ShadowLayout::Octahedron,
         side: 64,
         width: 1,
+        suns: 0,
     }),
     has_probes: true,
 };
@@ -189,6 +190,7 @@ fn mistakes_are_refused() {
                 layout: ShadowLayout::Cube,
                 side,
                 width,
+                suns: 0,
             };
             let wrong = PreviewDesc {
                 shadows: Some(shadows),
@@ -293,6 +295,11 @@ fn passes_are_those_that_are_needed() {
         // Depth, triangle, two weights and radiance of each sample.
         assert_eq!(bytes, 80 * 60 * (4 + 4 + 8 + 12));
         assert_eq!(names(shadows, &[sun]).0, bare);
+        // A map of the first of two suns, of which a host asked for one.
+        let with_sun = shadows.map(|shadows| PreviewShadows { suns: 1, ..shadows });
+        let of_sun =
+            "preview: lights, raster: surfaces, shadow maps of views: distances, raster: surfaces, preview: shade";
+        assert_eq!(names(with_sun, &[sun, sun]).0, of_sun);
         let (with, more) = names(shadows, &[sun, point]);
         assert_eq!(with, shadowed);
         // Depth and distance of the picture, and two maps.

@@ -108,6 +108,7 @@ fn drawn(gpu: &Gpu, scene: &Scene, samples: u32) -> Vec<f32> {
             layout: ShadowLayout::Octahedron,
             side: 512,
             width: 0,
+            suns: 0,
         }),
         has_probes: false,
     };

@@ -205,7 +205,7 @@ fn scenes_whose_light_it_would_leave_out_are_refused() {
 }
 
 #[test]
-fn lights_without_a_place_have_no_shadow_maps() {
+fn each_light_has_a_shadow_map_of_its_kind() {
     with_gpu(|gpu| {
         let directional = LightKind::Directional {
             direction: Vec3::NEG_Y,
@@ -216,10 +216,11 @@ fn lights_without_a_place_have_no_shadow_maps() {
             intensity: Vec3::ONE,
         };
         // Sides of maps tell how many there are.
-        for (lights, maps) in [
-            (vec![directional], 0),
-            (vec![directional, point], 1),
-            (vec![point, directional, point], 2),
+        for (lights, [placed, suns]) in [
+            (vec![directional], [0, 1]),
+            (vec![point], [1, 0]),
+            (vec![directional, point], [1, 1]),
+            (vec![point, directional, point], [2, 1]),
         ] {
             let mut scene = block();
             for light in &lights {
@@ -239,16 +240,23 @@ fn lights_without_a_place_have_no_shadow_maps() {
             };
             let (small, _) = started(256);
             let (large, _) = started(512);
-            assert_eq!(large - small, maps * 4 * (512 * 512 - 256 * 256), "{maps} maps");
+            assert_eq!(
+                large - small,
+                (placed + suns) * 4 * (512 * 512 - 256 * 256),
+                "{lights:?}"
+            );
             let report = rendered(&renderer, "preview", Value::Null, 1).report;
             let is_drawn = report
                 .pipelines
                 .iter()
                 .any(|p| p.shader == "raster/surface_octant.vert");
-            assert_eq!(is_drawn, maps > 0, "{maps} maps");
+            assert_eq!(is_drawn, placed > 0, "{lights:?}");
             assert!(report.pipelines.iter().any(|p| p.shader == "raster/surface.frag"));
-            let is_said = report.skipped.iter().any(|skipped| skipped.what == "shadow maps");
-            assert_eq!(is_said, maps == 0, "{maps} maps");
+            for (what, maps) in [("points and spots", placed), ("directional lights", suns)] {
+                let what = format!("shadow maps of {what}");
+                let is_said = report.skipped.iter().any(|skipped| skipped.what == what);
+                assert_eq!(is_said, maps == 0, "{lights:?}");
+            }
         }
     });
 }

@@ -682,10 +682,7 @@ fn planes_agree_with_their_twins() {
             let back = unpack_plane(&words);
             assert_eq!([result.bits(3), result.bits(4)], [back.medium, back.bounce]);
             assert_eq!(Vec3::from_slice(&result.0[5..]), back.first);
-            let extinctions = [
-                least_extinction(v3(&x, 20)),
-                plane_extinction(v3(&x, 23), v3(&x, 20)),
-            ];
+            let extinctions = [least_extinction(v3(&x, 20)), plane_extinction(v3(&x, 23), v3(&x, 20))];
             for (found, expected) in result.0[12..].iter().zip(extinctions) {
                 assert!(
                     *found == expected as f32 || expected.is_infinite() && *found > 1e38,
@@ -705,7 +702,11 @@ fn planes_agree_with_their_twins() {
                 "{:?}",
                 case.0
             );
-            assert!((f64::from(result.0[11]) - met.jacobian).abs() <= 64.0 * U, "{:?}", case.0);
+            assert!(
+                (f64::from(result.0[11]) - met.jacobian).abs() <= 64.0 * U,
+                "{:?}",
+                case.0
+            );
         }
     });
 }

@@ -9,7 +9,7 @@
 //! - [`CaptureBy::Raster`]: the preview's shading with its shadow maps, one pass; light of points, spots and directions alone.
 //! - [`CaptureBy::Rays`]: the path tracer on a range of bounces; all light, with noise. It has further layers of surfaces behind the first where they are asked for (`peel.rs`).
 //!
-//! Bias: shadows of the former are those of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), directional lights cast none. Surfaces nearer than 2⁻¹⁴ of the way to the farthest one are not
+//! Bias: shadows of the former are those of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), of directional lights of [`ViewShadowMaps`](crate::raster::ViewShadowMaps). Surfaces nearer than 2⁻¹⁴ of the way to the farthest one are not
 //! drawn. Deterministic.
 
 use std::ops::Range;

@@ -3,16 +3,14 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use glam::Vec3;
-
 use super::capture::{CaptureBy, CapturePlan};
 use crate::Result;
 use crate::gpu::{Area, Buffer, Gpu, PipelineInfo, Timings};
 use crate::maps::octahedron::OctahedronLayout;
-use crate::raster::{Coverage, DrawPart, GBuffer, GBufferDesc, Layering, OctantCut, OmniShadowMaps, Output, View};
+use crate::raster::{Coverage, DrawPart, GBuffer, GBufferDesc, Layering, OctantCut, Output, View};
 use crate::techniques::Part;
 use crate::techniques::preview::{
-    Eye, LightRoom, PreviewLights, PreviewPart, PreviewShadows, SHADED_OUTPUTS, Seen, Shade, Target,
+    Eye, LightMap, LightRoom, PreviewLights, PreviewPart, PreviewShadows, SHADED_OUTPUTS, Seen, Shade, Target,
 };
 use crate::transport::GpuScene;
 
@@ -37,9 +35,9 @@ enum Piece {
     MeasureSurfaces,
     Surfaces(DrawPart),
     Lights,
-    /// Finds in which parts the shadow map of a light at a place is drawn.
-    MeasureShadow(u32, Vec3),
-    Shadow(u32, Vec3, DrawPart),
+    /// Finds in which parts the shadow map of a light is drawn.
+    MeasureShadow(LightMap),
+    Shadow(LightMap, DrawPart),
     /// Shades these texels.
     Shade(Range<u32>),
 }
@@ -79,7 +77,7 @@ impl MapDrawing {
         )?;
         let shading = || -> Result<_> {
             let room = LightRoom::of(&scene.lights_without_area());
-            let shadows = (room.placed > 0).then(|| shadows_of_side(plan.shadow_side));
+            let shadows = (!room.is_without_maps()).then(|| shadows_of_side(plan.shadow_side));
             let lights = PreviewLights::new(gpu, &surfaces, room, shadows)?;
             let shade = Shade::new(gpu, scene, &lights, true, false)?;
             Ok(Shading { lights, shade })
@@ -106,7 +104,7 @@ impl MapDrawing {
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = self.gbuffer.pipelines();
         if let Some(Shading { lights, shade }) = &self.shading {
-            all.extend(lights.shadows().into_iter().flat_map(OmniShadowMaps::pipelines));
+            all.extend(lights.pipelines());
             all.extend(shade.pipelines());
         }
         all
@@ -157,23 +155,16 @@ impl MapDrawing {
                 self.gbuffer.record_part(&mut recorder, &surfaces, &octants()?, &part)?;
             }
             (Piece::Lights, Some(Shading { lights, .. })) => {
-                let places = lights.record_lights(&mut recorder, &scene.lights_without_area())?;
-                let maps = places.into_iter().enumerate();
-                self.put_first(maps.map(|(map, place)| Piece::MeasureShadow(map as u32, place)));
+                let maps = lights.record_lights(&mut recorder, &surfaces, &scene.lights_without_area())?;
+                self.put_first(maps.into_iter().map(Piece::MeasureShadow));
             }
-            (Piece::MeasureShadow(map, place), Some(Shading { lights, .. })) => {
-                if let Some(shadows) = lights.shadows() {
-                    let views = shadows.views(&surfaces, place)?;
-                    let parts = self.coverage.parts(&surfaces, &views, [shadows.desc().side; 2])?;
-                    self.put_first(parts.into_iter().map(|part| Piece::Shadow(map, place, part)));
-                }
+            (Piece::MeasureShadow(map), Some(Shading { lights, .. })) => {
+                let parts = lights.parts_of_map(&self.coverage, &surfaces, &map)?;
+                self.put_first(parts.into_iter().map(|part| Piece::Shadow(map, part)));
                 return Ok(Vec::new());
             }
-            (Piece::Shadow(map, place, part), Some(Shading { lights, .. })) => {
-                if let Some(shadows) = lights.shadows() {
-                    let views = shadows.views(&surfaces, place)?;
-                    shadows.record_part(&mut recorder, &surfaces, map, &views, &part)?;
-                }
+            (Piece::Shadow(map, part), Some(Shading { lights, .. })) => {
+                lights.record_map(&mut recorder, &surfaces, &map, &part)?;
             }
             (Piece::Shade(texels), Some(Shading { lights, shade })) => {
                 recorder.pass("capture: shade", |pass| {

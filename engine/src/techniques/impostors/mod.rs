@@ -22,7 +22,7 @@
 //! - Light on its way to what lies within a body that absorbs is not absorbed: in the map it is lit as if nothing were around it.
 //! - A surface that is smooth by a texture alone is not taken for one that reflects: it is in the map, and without others there is none.
 //! - Bodies that reflect do not show in reflections, their own included.
-//! - A rasterized map has the shadows, and their borders, of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), none of directional lights, and draws partial alpha opaque.
+//! - A rasterized map has the shadows, and their borders, of [`OmniShadowMaps`](crate::raster::OmniShadowMaps) and [`ViewShadowMaps`](crate::raster::ViewShadowMaps), and draws partial alpha opaque.
 //!
 //! In the limit of many texels and steps, what convex rooms of diffuse walls show in a convex mirror is exact.
 //!

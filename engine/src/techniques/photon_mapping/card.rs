@@ -160,7 +160,10 @@ impl Technique for PhotonMapper {
             ("extend_rays", eye.extend_rays),
             ("shadow_rays", eye.shadow_rays),
             ("photon_rays", c.photons.rays),
-            ("rays", eye.extend_rays + eye.shadow_rays + c.photons.rays + c.beams.rays),
+            (
+                "rays",
+                eye.extend_rays + eye.shadow_rays + c.photons.rays + c.beams.rays,
+            ),
             ("waves", eye.waves),
             ("stalls", eye.stalls),
             ("postponed", eye.postponed),

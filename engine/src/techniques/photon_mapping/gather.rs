@@ -32,7 +32,6 @@ const NEAREST_SEARCHES: u32 = NEAREST_ROUNDS + NEAREST_HALVINGS;
 /// Records that a submission takes at all of its places, where no hierarchy helps: a fraction of a second on devices that a driver watches.
 const LINEAR_RECORDS: u64 = 1 << 28;
 
-
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[non_exhaustive]

@@ -15,7 +15,7 @@ use crate::transport::PathSet;
 
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Biased(
-    "shadow maps err at borders of shadows, and as a whole where things are no larger than texels; directional lights have none; an \
+    "shadow maps err at borders of shadows, and as a whole where things are no larger than texels; an \
      environment's light is not occluded, and its reflections are filtered by round lobes, with Schlick's factor off rough metals",
 );
 
@@ -92,6 +92,13 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
             format!("{placed} lights have a place, and there are shadow maps for {SHADOW_MAPS_MAX}"),
         ),
         (
+            profile.lights.directional > SHADOW_MAPS_MAX as usize,
+            format!(
+                "{} lights are directional, and there are shadow maps for {SHADOW_MAPS_MAX}",
+                profile.lights.directional
+            ),
+        ),
+        (
             lights > LIGHTS_MAX as usize,
             format!("it has {lights} lights, of which {LIGHTS_MAX} are drawn"),
         ),
@@ -107,7 +114,7 @@ const ROWS: &[Row] = &[Row {
     id: "CL-PREVIEW",
     name: "technique `preview`: deferred shading with shadow maps and light probes, frame by frame, and the same for hosts' own frames",
     role: Role::Technique,
-    limits: "Light of surfaces on others is left out, except for what a host's probe holds; directional lights cast no shadows, nothing is seen through glass, and classical microfacets and modified Phong surfaces are refused.",
+    limits: "Light of surfaces on others is left out, except for what a host's probe holds; nothing is seen through glass, and classical microfacets and modified Phong surfaces are refused.",
     sources: &[
         sources::DEERING_1988.whole(),
         sources::SAITO_TAKAHASHI_1990.whole(),
@@ -131,6 +138,7 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/preview/moving.rs::moved_objects_are_as_if_made_there",
         "tests/tests/preview/moving.rs::passes_are_those_that_are_needed",
         "tests/tests/preview/technique.rs::pictures_come_to_be_the_path_tracers",
+        "tests/tests/preview/technique.rs::each_light_has_a_shadow_map_of_its_kind",
         "engine/src/techniques/preview/probe.rs::lobes_grow_from_level_to_level",
         "engine/src/techniques/preview/probe.rs::levels_of_lobes_are_those_of_their_widths",
         "engine/src/techniques/preview/probe.rs::mixtures_are_near_the_lobe",

@@ -6,7 +6,7 @@ use super::card::{NO_CLASSIC, NO_MEDIA, NO_PHONG};
 use super::lights::{LightRoom, PreviewLights, PreviewShadows};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use crate::gpu::{Area, Gpu, PipelineInfo, Recorder};
-use crate::raster::{DrawPart, GBuffer, GBufferDesc, Layering, OmniShadowMaps, Surfaces, View};
+use crate::raster::{DrawPart, GBuffer, GBufferDesc, Layering, Surfaces, View};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
 use crate::{Error, Result};
@@ -131,13 +131,13 @@ impl Drawing {
     /// What draws surfaces and shadow maps, and shades.
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = self.gbuffer.pipelines();
-        all.extend(self.lights.shadows().into_iter().flat_map(OmniShadowMaps::pipelines));
+        all.extend(self.lights.pipelines());
         all.extend(self.shade.pipelines());
         all
     }
 
     /// Bytes of its pictures and of the shadow maps.
     pub fn bytes(&self) -> u64 {
-        self.gbuffer.bytes() + self.lights.shadows().map_or(0, OmniShadowMaps::bytes)
+        self.gbuffer.bytes() + self.lights.bytes()
     }
 }

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{DVec2, Vec3};
+use glam::DVec2;
 
 use super::drawing::Drawing;
-use super::lights::{LightRoom, PreviewShadows};
+use super::lights::{LightMap, LightRoom, PreviewShadows};
 use super::probe::{LightProbe, LightProbeDesc};
 use super::shade::{PreviewPart, Target};
 use crate::Result;
@@ -48,6 +48,7 @@ impl PreviewSettings {
             layout: self.shadow_layout,
             side: self.shadow_side,
             width: self.shadow_width,
+            suns: 0,
         }
     }
 
@@ -70,10 +71,10 @@ pub struct PreviewMethod {
     probe: Option<LightProbe>,
     lights_drawn: u64,
     coverage: Coverage,
-    /// Places of the shadow maps whose parts have been counted, as bits.
-    measured: Vec<[u32; 3]>,
-    /// Parts of what frames share: maps by number and where they are seen from.
-    shadow_parts: Vec<(u32, Vec3, DrawPart)>,
+    /// Shadow maps whose parts have been counted.
+    measured: Vec<LightMap>,
+    /// Parts of what frames share.
+    shadow_parts: Vec<(LightMap, DrawPart)>,
     /// Parts of a frame that draw; further ones shade.
     draw_parts: Vec<DrawPart>,
 }
@@ -87,7 +88,7 @@ impl PreviewMethod {
     /// sizes; [`Error::OutOfMemory`](crate::Error::OutOfMemory), [`Error::DeviceLost`](crate::Error::DeviceLost).
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, size: [u32; 2], settings: PreviewSettings) -> Result<Self> {
         let lights = LightRoom::of(&scene.lights_without_area());
-        let shadows = (lights.placed > 0).then_some(settings.shadows());
+        let shadows = (!lights.is_without_maps()).then_some(settings.shadows());
         let environment = scene.read_environment(gpu)?;
         let probe = environment.map(|environment| LightProbe::of_environment(gpu, settings.probe(), &environment));
         let probe = probe.transpose()?;
@@ -120,23 +121,18 @@ impl FrameMethod for PreviewMethod {
 
     fn begin_parts(&mut self, _: &Gpu) -> Result<Option<u32>> {
         let (surfaces, lights) = (self.scene.surfaces(), self.scene.lights_without_area());
-        let places = self.drawing.lights.places(&lights);
-        let bits = |place: &Vec3| place.to_array().map(f32::to_bits);
-        let is_measured = |(place, known): (&Vec3, &[u32; 3])| bits(place) == *known;
-        if self.measured.len() > places.len() || !places.iter().zip(&self.measured).all(is_measured) {
+        let maps = self.drawing.lights.maps(&lights);
+        if !maps.starts_with(&self.measured) {
             self.measured.clear();
             self.shadow_parts.clear();
         }
         // A map each time: hosts look at the time between two.
-        let map = self.measured.len();
-        if let (Some(shadows), Some(&place)) = (self.drawing.lights.shadows(), places.get(map)) {
-            let views = shadows.views(&surfaces, place)?;
-            let parts = self.coverage.parts(&surfaces, &views, [shadows.desc().side; 2])?;
-            let parts = parts.into_iter().map(|part| (map as u32, place, part));
-            self.shadow_parts.extend(parts);
-            self.measured.push(bits(&place));
+        if let Some(map) = maps.get(self.measured.len()) {
+            let parts = self.drawing.lights.parts_of_map(&self.coverage, &surfaces, map)?;
+            self.shadow_parts.extend(parts.into_iter().map(|part| (*map, part)));
+            self.measured.push(*map);
         }
-        let is_whole = self.measured.len() == places.len();
+        let is_whole = self.measured.len() == maps.len();
         Ok(is_whole.then(|| self.shadow_parts.len().max(1) as u32))
     }
 
@@ -144,15 +140,11 @@ impl FrameMethod for PreviewMethod {
         let (surfaces, lights) = (self.scene.surfaces(), self.scene.lights_without_area());
         if part.number == 0 {
             self.lights_drawn += lights.len() as u64;
-            self.drawing.lights.record_lights(recorder, &lights)?;
+            self.drawing.lights.record_lights(recorder, &surfaces, &lights)?;
         }
-        let shadows = self.drawing.lights.shadows();
-        match (shadows, self.shadow_parts.get(part.number as usize)) {
-            (Some(shadows), Some((map, place, part))) => {
-                let views = shadows.views(&surfaces, *place)?;
-                shadows.record_part(recorder, &surfaces, *map, &views, part)
-            }
-            _ => Ok(()),
+        match self.shadow_parts.get(part.number as usize) {
+            Some((map, part)) => self.drawing.lights.record_map(recorder, &surfaces, map, part),
+            None => Ok(()),
         }
     }
 
@@ -238,8 +230,13 @@ impl FrameMethod for PreviewMethod {
             (self.probe.is_none(), "light probe", "the scene has no environment"),
             (
                 self.drawing.lights.shadows().is_none(),
-                "shadow maps",
+                "shadow maps of points and spots",
                 "no light has a place",
+            ),
+            (
+                self.drawing.lights.suns().is_none(),
+                "shadow maps of directional lights",
+                "the scene has none",
             ),
         ];
         let missing = all.into_iter().filter(|(is_missing, ..)| *is_missing);

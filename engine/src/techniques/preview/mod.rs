@@ -4,7 +4,7 @@
 //! "Comprehensible Rendering of 3-D Shapes", SIGGRAPH 1990 (G-buffers); those of [`OmniShadowMaps`](crate::raster::OmniShadowMaps) and of
 //! [`LightProbe`]. One compute pass shades what is seen: surfaces and their scattering functions are the path tracer's own.
 //!
-//! What it shows: emission; point, spot and directional lights, through shadow maps where they have a place; light of a [`LightProbe`] by two
+//! What it shows: emission; point, spot and directional lights, through shadow maps; light of a [`LightProbe`] by two
 //! look-ups, the diffuse lobes' and the microfacets' albedos times filtered light. In a uniform environment every opaque material has its exact albedo,
 //! but for rough metals by another factor than Schlick's. A [`LiveProbe`] is drawn in the scene itself, so that objects that move reflect what is around them, each frame, or as a [`FadingProbe`] now and then;
 //! a [`ReflectionMap`] is drawn likewise, for kernels of hosts that look mirrors and glossy reflections up by a summed-area table; a [`PlanarMirror`] is a second picture,
@@ -13,7 +13,8 @@
 //! Bias, all of it:
 //!
 //! - Emitting surfaces light others only through a live map.
-//! - Directional lights cast no shadows; shadows of the others have the bias of [`OmniShadowMaps`](crate::raster::OmniShadowMaps).
+//! - Shadows have the bias of [`OmniShadowMaps`](crate::raster::OmniShadowMaps), and those of directional lights of [`ViewShadowMaps`](crate::raster::ViewShadowMaps), whose texels are parts of all of the
+//!   scene's width; a host's directional lights cast none unless it asks for maps of them.
 //! - A probe's light is neither occluded nor nearer than infinity, and interreflection is limited to what a probe holds.
 //! - Microfacet reflections are filtered by a round lobe, mixed of two for roughnesses between those of a probe's levels ([`probe`]), without what the lobe's own Fresnel factors and masking do to its shape.
 //! - Rough metals reflect a probe's light by Schlick's factor from their reflectance at normal incidence, whatever the form that they name: without the dip of
@@ -52,7 +53,7 @@ pub use reflection::{ReflectionMap, ReflectionMapDesc};
 pub use search::SearchedReflections;
 pub use shade::{PARTS_MAX, PreviewPart};
 
-pub(in crate::techniques) use lights::LightRoom;
+pub(in crate::techniques) use lights::{LightMap, LightRoom};
 pub(in crate::techniques) use shade::{Eye, OUTPUTS as SHADED_OUTPUTS, Seen, Shade, Target};
 
 use self::drawing::Drawing;
@@ -74,7 +75,7 @@ pub struct PreviewDesc {
     pub samples: u32,
     /// Lights at most, up to 1024; with shadow maps up to [`SHADOW_MAPS_MAX`](crate::raster::SHADOW_MAPS_MAX).
     pub lights: u32,
-    /// Shadow maps of lights that have a place; `None` for none.
+    /// Shadow maps of lights that have a place, and of directional ones as far as they are asked for; `None` for none.
     pub shadows: Option<PreviewShadows>,
     /// Whether surfaces are lit by probes.
     pub has_probes: bool,
@@ -120,6 +121,7 @@ impl Preview {
         let room = LightRoom {
             all: desc.lights,
             placed: desc.lights,
+            suns: desc.shadows.map_or(0, |shadows| shadows.suns.min(desc.lights)),
         };
         Ok(Self {
             gpu: gpu.clone(),
@@ -140,7 +142,7 @@ impl Preview {
         &self.drawing.lights
     }
 
-    /// Records the lights that pictures are lit by from here on: their records, and shadow maps of `surfaces` from those that have a place. To be recorded
+    /// Records the lights that pictures are lit by from here on: their records, and shadow maps of `surfaces`. To be recorded
     /// anew when lights or surfaces have moved.
     ///
     /// # Errors

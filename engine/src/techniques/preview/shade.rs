@@ -15,7 +15,7 @@ use crate::gpu::{
     Access, Buffer, BufferBarrier, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Sampler, SamplerDesc,
 };
 use crate::maps::directional_map::DirectionalMap;
-use crate::raster::{GBuffer, Output};
+use crate::raster::{GBuffer, Output, ViewShadowMaps};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::{GpuScene, surface_spec};
 use crate::{Error, Result};
@@ -190,6 +190,8 @@ impl Shade {
                 frames: self.frames.view(),
                 lights: lights.records().view(),
                 radiance: target.buffer.view(),
+                sun_views: lights.sun_views().unwrap_or(&self.no_shadows).view(),
+                view_distances: lights.suns().map_or(self.no_shadows.view(), ViewShadowMaps::distances),
             };
             let map = part.probe.map_or(&self.dark, LightProbe::filtered);
             let groups = self.pipeline.groups_over(pixels.len() as u32);
@@ -226,6 +228,7 @@ fn spec(
         sees_all_directions: all_directions,
         has_probe,
         has_shadows: shadows.is_some(),
+        has_sun_shadows: lights.suns().is_some(),
         shadow_kind: shadows.map_or(0, |maps| maps.desc().layout.kind()),
         shadow_width: lights.width() as i32,
         directional_kind: constants.kind,
@@ -259,7 +262,7 @@ pub(super) fn frame(seen: &Seen<'_>, part: &PreviewPart<'_>) -> PreviewFrame {
         first_pixel: target.first,
         stride: target.stride,
         has_background: part.background.into(),
-        shadow_side: lights.shadows().map_or(0, |maps| maps.desc().side as i32),
+        shadow_side: lights.side() as i32,
         probe_levels: known.len() as u32,
         probe_alphas: alphas,
         ..PreviewFrame::default()

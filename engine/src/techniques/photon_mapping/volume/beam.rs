@@ -14,7 +14,7 @@ use crate::techniques::photon_mapping::gather::GatherCounts;
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
 use crate::techniques::photon_mapping::settings::PhotonSettings;
 use crate::transport::{GpuScene, PathSet};
-use crate::walk::{Places, StoppedPlaces, WalkKey, stage_barrier};
+use crate::walk::{Places, WalkKey, stage_barrier};
 use crate::{Error, Result};
 
 /// Nodes and events of a query, at most: beside a walk through a grid, its loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).

@@ -5,7 +5,9 @@ use crate::gpu::shaders::constants::{NO_MEDIUM, PLANE_RAY_ENDED, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::techniques::photon_mapping::photon_plane_rays;
 use crate::gpu::shaders::types::PlaneRay;
-use crate::gpu::{Access, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, wide_counter};
+use crate::gpu::{
+    Access, Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, wide_counter,
+};
 use crate::transport::GpuScene;
 use crate::walk::{Places, RAY_QUOTA, StoppedPlaces, WalkKey, ray_quota, stage_barrier};
 use crate::{Error, Result};

@@ -137,12 +137,7 @@ impl VolumeTrace {
                 stores_planes,
             })?,
             planes: stores_planes
-                .then(|| {
-                    work(
-                        "photon planes",
-                        u64::from(slots) * size_of::<PlaneWords>() as u64,
-                    )
-                })
+                .then(|| work("photon planes", u64::from(slots) * size_of::<PlaneWords>() as u64))
                 .transpose()?,
             ways: if stores_ways {
                 let bytes = u64::from(slots) * size_of::<types::PhotonWay>() as u64;

@@ -81,6 +81,7 @@ impl<'a> Stage<'a> {
                 layout: ShadowLayout::Octahedron,
                 side: 1024,
                 width: 0,
+                suns: 0,
             }),
             has_probes: false,
         };

@@ -146,6 +146,7 @@ fn row(gpu: &Gpu, turned: f64, size: u32, spp: u32) -> Result<Row> {
             layout: ShadowLayout::Octahedron,
             side: 512,
             width: 0,
+            suns: 0,
         }),
         has_probes: false,
     };

@@ -78,6 +78,7 @@ impl<'a> Subject<'a> {
                 layout: ShadowLayout::Octahedron,
                 side,
                 width: 0,
+                suns: 0,
             }),
             has_probes: has_live_map,
         };
