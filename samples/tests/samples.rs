@@ -534,7 +534,7 @@ fn volume_photons(arguments: &[&str]) -> (image::RgbImage, String) {
 
 #[test]
 fn photons_in_media_have_the_same_light_by_every_estimate() {
-    let [march, ray, beams, planes] = ["march", "ray", "beams", "planes"].map(|volume| {
+    let [march, ray, beams, planes, unified] = ["march", "ray", "beams", "planes", "unified"].map(|volume| {
         let (picture, text) = volume_photons(&["--volume", volume]);
         assert_eq!(picture.dimensions(), (40, 40));
         assert!(
@@ -547,10 +547,13 @@ fn photons_in_media_have_the_same_light_by_every_estimate() {
         mean(&picture, [0.0, 1.0], [0.0, 1.0])
     });
     // But for noise and blur, of which balls lose most by walls.
-    for other in [march, beams, planes] {
+    for other in [march, beams, planes, unified] {
         for channel in 0..3 {
             let ratio = other[channel] / ray[channel];
-            assert!((ratio - 1.0).abs() < 0.1, "{march:?} {ray:?} {beams:?} {planes:?}");
+            assert!(
+                (ratio - 1.0).abs() < 0.1,
+                "{march:?} {ray:?} {beams:?} {planes:?} {unified:?}"
+            );
         }
     }
     // The same frames again are the same picture.

@@ -134,6 +134,7 @@ void main() {
         out1(6u, at.squared);
         out1(7u, at.sine);
         out1(8u, line_profile(in_bits(20u), in1(21u)));
+        out1(9u, point_share(in1(22u), in1(23u), in1(24u), in1(25u), at.sine));
         break;
     }
     case 9u: {  // planes

@@ -39,9 +39,10 @@ const TURN: f64 = 3.0;
 const SIZE: [u32; 2] = [256, 256];
 const FRAMES: u32 = 32;
 /// In the order of the key.
-const ESTIMATES: [VolumeEstimate; 4] = [
+const ESTIMATES: [VolumeEstimate; 5] = [
     VolumeEstimate::March,
     VolumeEstimate::Ray,
+    VolumeEstimate::Unified,
     VolumeEstimate::Beams,
     VolumeEstimate::Planes,
 ];
@@ -124,6 +125,7 @@ impl VolumePhotons {
             VolumeEstimate::Ray => "ray",
             VolumeEstimate::Beams => "beams",
             VolumeEstimate::Planes => "planes",
+            VolumeEstimate::Unified => "unified",
         };
         let Some((counts, radius)) = self.0.counts() else {
             return name.into();

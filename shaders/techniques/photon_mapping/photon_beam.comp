@@ -7,6 +7,7 @@
 // instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam.
 // Of planes L = sum_j tau(t_j) sigma_s^2 p(w_j', -v) tau_j' Phi_j / |v . (w_j x w_j')| with the directions w_j and w_j' of both flights, and tau_j' what is left there of other
 // bands than the one that flights end as in: without blur. One of those that a ray meets has a ray that tells whether it is seen (photon_plane_ray.glsl).
+// Where collisions are stored beside beams each has the share of the balance heuristic (point_share).
 // Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Transmittances are exact in homogeneous media. In a grid one delta tracking a ray finds how far light of each band comes; what lies before counts in
 // full, what lies behind does not: unbiased. One that its quota stops goes on in a later dispatch, before anything is asked. Events count in their own medium alone.
 //
@@ -34,6 +35,7 @@ layout(constant_id = 43) const bool LINEAR = false;  // goes through records, fo
 layout(constant_id = 47) const bool MARCHES = false;
 layout(constant_id = 55) const bool BEAMS = false;   // the map holds ways of photons
 layout(constant_id = 56) const bool PLANES = false;  // and planes
+layout(constant_id = 57) const bool POINTS = false;  // and collisions
 
 layout(set = 1, binding = 0) uniform utextureBuffer event_pairs;
 layout(set = 1, binding = 1) uniform utextureBuffer event_records;
@@ -48,7 +50,7 @@ layout(set = 1, binding = 6, scalar) restrict buffer PhotonPlaneRays { PlaneRay 
 
 uvec4 compact_quarter(uint index) { return texelFetch(event_pairs, int(index)); }
 uvec4 event_quarter(uint record, uint quarter) {
-    return texelFetch(event_records, int((PLANES ? PLANE_QUARTERS : EVENT_QUARTERS) * record + quarter));
+    return texelFetch(event_records, int((PLANES || POINTS ? WIDE_QUARTERS : EVENT_QUARTERS) * record + quarter));
 }
 bool compact_visit_beam(uint record);
 
@@ -65,7 +67,8 @@ layout(push_constant, scalar) uniform Push {
     uint least_bounces;  // scatterings in all, with that of the event
     uint most_bounces;
     float scale;         // of stored fluxes
-    float radius;        // of beams
+    float radius;        // of beams, and of collisions that no mean free path bounds
+    float path_share;    // of the latter over the mean free path, at most; 0 for any
     float plane_weight;  // of planes' fluxes, beside the scale
     uint first_place;    // of LINEAR
     uint first;          // of the records that a linear query goes through
@@ -142,8 +145,18 @@ bool counts_here(uint medium, uint history) {
     return counts;
 }
 
+// Of collisions here, as they were stored (photon_medium.comp).
+float point_radius() {
+    float densest = largest_component(beam.m.sigma_t);
+    return push.path_share > 0.0 ? min(push.radius, push.path_share / densest) : push.radius;
+}
+
+float share_of_points(float flight, float radius, float sine) {
+    return point_share(mean_extinction(beam.m.sigma_t), flight, radius, push.radius, sine);
+}
+
 // Adds a beam's light where the ray passes it.
-void add_beam(uvec4 q0, uvec4 q1) {
+void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
     PhotonBeam b = unpack_beam(q0, q1);
     vec3 way = b.end - b.start;
     float reach = length(way);
@@ -155,6 +168,9 @@ void add_beam(uvec4 q0, uvec4 q1) {
             vec3 passed = passed_to(at.t) * transmittance(beam.m.sigma_t, at.along);
             float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
             weight *= phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+            if (POINTS) {
+                weight *= 1.0 - share_of_points(unpack_flight(q2) + at.along, point_radius(), at.sine);
+            }
             ++gathered_events;
             gathered += weight * beam.m.sigma_s * passed * b.flux;
         }
@@ -205,8 +221,12 @@ bool compact_visit_beam(uint record) {
             return !event_ends_leaf(q0);
         }
     }
-    if (BEAMS) {
-        add_beam(q0, q1);
+    uvec4 q2 = uvec4(0u);
+    if (POINTS) {
+        q2 = event_quarter(record, 2u);
+    }
+    if (BEAMS && !(POINTS && is_point(q2))) {
+        add_beam(q0, q1, q2);
         return !event_ends_leaf(q0);
     }
     float radius = uintBitsToFloat(q1.y);
@@ -220,6 +240,10 @@ bool compact_visit_beam(uint record) {
             : kernel_profile(PROFILE, approach.y / (radius * radius)) / (radius * radius) * passed_to(approach.x);
         if (weight != vec3(0.0)) {
             PhotonEvent e = unpack_event(q0, q1);
+            // In grids there are no beams.
+            if (POINTS && !(HAS_GRIDS && beam.m.has_grid != 0u)) {
+                weight *= share_of_points(unpack_flight(q2), radius, length(cross(e.direction, beam.direction)));
+            }
             ++gathered_events;
             gathered += weight * phase_function(beam.m.phase, beam.m.phase_parameter, e.direction, -beam.direction) * e.flux;
         }

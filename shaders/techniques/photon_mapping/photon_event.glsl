@@ -12,8 +12,10 @@
 #include "techniques/photon_mapping/photon_history.glsl"
 
 const uint EVENT_QUARTERS = 2u;
-// Of all records of a map that has planes.
-const uint PLANE_QUARTERS = 3u;
+// Of all records of a map that has another kind beside beams.
+const uint WIDE_QUARTERS = 3u;
+// The last word of such a record of a collision; 0 in others.
+const uint POINT_RECORD = 1u;
 // In the word of the medium: last record of a leaf.
 const uint EVENT_LEAF_END = 0x80000000u;
 const uint EVENT_MEDIUM_MASK = 0x00FFFFFFu;
@@ -98,6 +100,21 @@ PhotonPlane unpack_plane(uvec4 q0, uvec4 q1, uvec4 q2) {
 }
 
 bool is_plane(uvec4 q2) { return uintBitsToFloat(q2.xyz) != vec3(0.0); }
+
+// A collision beside beams: its third quarter also has the flight that it ends. That of a beam says how long the flight before the beam's beginning was.
+uvec4 pack_flight(float flight, uint kind) { return uvec4(floatBitsToUint(flight), 0u, 0u, kind); }
+float unpack_flight(uvec4 q2) { return uintBitsToFloat(q2.x); }
+bool is_point(uvec4 q2) { return q2.w == POINT_RECORD; }
+
+// Share that the estimate by collisions has of light that one by beams has, too, in media of this mean extinction: the balance heuristic. A photon collides within the disk of a
+// ray with the density of its flight times the disk's area; its beam passes within a width of both sides, seen at an angle of this sine.
+float point_share(float extinction, float flight, float point_radius, float beam_radius, float sine) {
+    float points = extinction * exp(-extinction * flight) * PI * point_radius * point_radius;
+    float both = points + 2.0 * beam_radius * sine;
+    return both > 0.0 ? points / both : 1.0;
+}
+
+float mean_extinction(vec3 sigma_t) { return (sigma_t.x + sigma_t.y + sigma_t.z) / 3.0; }
 
 // Extinction of the band through which light comes farthest, of those with any.
 float least_extinction(vec3 sigma_t) {

@@ -15,6 +15,7 @@ layout(set = 0, binding = 2, scalar) restrict buffer LbvhStateBlock { LbvhState 
 
 layout(constant_id = 0) const bool BEAMS = false;  // records are pieces of ways
 layout(constant_id = 1) const bool PLANES = false;  // or planes, too
+layout(constant_id = 2) const bool POINTS = false;  // or collisions
 
 layout(push_constant, scalar) uniform PhotonEventBoxesPush {
     uint count;
@@ -53,7 +54,7 @@ void main() {
     uint place = gl_WorkGroupID.x * LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION + lane;
     LbvhBox centres = LbvhBox(ivec3(0x7FFFFFFF), ivec3(int(0x80000000u)));
     for (uint i = 0u; i < LBVH_BOXES_PER_INVOCATION && place < event_push.count; ++i) {
-        uint quarter = (PLANES ? PLANE_QUARTERS : EVENT_QUARTERS) * place;
+        uint quarter = (PLANES || POINTS ? WIDE_QUARTERS : EVENT_QUARTERS) * place;
         vec3 from = uintBitsToFloat(texelFetch(event_records_in, int(quarter)).xyz);
         uvec4 q1 = texelFetch(event_records_in, int(quarter + 1u));
         vec3 to = BEAMS ? uintBitsToFloat(q1.xyz) : from;
@@ -64,6 +65,10 @@ void main() {
                 plane_corners(uintBitsToFloat(q2.xyz), from, to);
                 radius = 0.0;
             }
+        }
+        if (POINTS && is_point(texelFetch(event_records_in, int(quarter + 2u)))) {
+            to = from;
+            radius = uintBitsToFloat(q1.y);
         }
         LbvhBox box = event_box(from, to, radius);
         lbvh_boxes[LBVH_BOX_QUARTERS * place] = ivec4(box.lower, box.upper.x);

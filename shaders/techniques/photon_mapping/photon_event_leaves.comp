@@ -14,7 +14,7 @@ layout(set = 0, binding = 1) uniform utextureBuffer map_order;
 layout(set = 0, binding = 2) uniform utextureBuffer map_retained;
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer EventMapRecords { uvec4 event_records_out[]; };
 
-layout(constant_id = 0) const bool PLANES = false;  // records may be planes
+layout(constant_id = 0) const bool WIDE = false;  // records are of several kinds
 
 layout(push_constant, scalar) uniform PhotonEventLeavesPush { uint count; } event_push;
 
@@ -23,7 +23,7 @@ void main() {
     if (place >= event_push.count) {
         return;
     }
-    uint quarters = PLANES ? PLANE_QUARTERS : EVENT_QUARTERS;
+    uint quarters = WIDE ? WIDE_QUARTERS : EVENT_QUARTERS;
     uint from = quarters * texelFetch(map_order, int(place >> 2))[place & 3u];
     bool ends = place + 1u == event_push.count || texelFetch(map_retained, int(place)).x != 0u;
     uvec4 first = texelFetch(event_records_in, int(from));

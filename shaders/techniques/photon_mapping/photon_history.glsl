@@ -13,8 +13,8 @@ const uint PHOTON_CLASSES = 15u;
 // both.
 const uint FLAG_VOLUME = 16u;
 const uint FLAG_LANDED = 32u;
-// Two flights wait there, where planes are stored.
-const uint FLAG_PLANE = 64u;
+// A record waits there beside the way: a plane of two flights, or a collision, where these are stored as well.
+const uint FLAG_BESIDE = 64u;
 
 // Stand for the density of directions in a photon's walk, where planes are stored: whether its way begins at a collision with the medium that it goes through.
 const float PHOTON_FROM_COLLISION = 1.0;

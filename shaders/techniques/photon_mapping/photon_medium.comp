@@ -129,14 +129,14 @@ uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMe
         return 0u;
     }
     atomicAdd(photon_medium_counters.events, 1u);
-    photon_planes[PLANE_QUARTERS * place] = q0;
-    photon_planes[PLANE_QUARTERS * place + 1u] = q1;
-    photon_planes[PLANE_QUARTERS * place + 2u] = q2;
-    return FLAG_WAITING | FLAG_PLANE;
+    photon_beside[WIDE_QUARTERS * place] = q0;
+    photon_beside[WIDE_QUARTERS * place + 1u] = q1;
+    photon_beside[WIDE_QUARTERS * place + 2u] = q2;
+    return FLAG_WAITING | FLAG_BESIDE;
 }
 
-// Stores a collision at `at`, after which the photon has the flux that is scattered.
-uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, float radius) {
+// Stores a collision at `at`, after which the photon has the flux that is scattered, with the flight that it ends where ways are stored, too.
+uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, float radius, float flight) {
     atomicAdd(photon_medium_counters.events, 1u);
     uint bounce = path_set_bounce(photon.bounce);
     uint history = HAS_CLASSES ? path_set_state(photon.bounce) : bounce;
@@ -144,6 +144,12 @@ uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, floa
     uvec4 q1;
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
     pack_event(PhotonEvent(at, photon.direction, flux, radius, medium, history), q0, q1);
+    if (STORES_POINTS) {
+        photon_beside[WIDE_QUARTERS * place] = q0;
+        photon_beside[WIDE_QUARTERS * place + 1u] = q1;
+        photon_beside[WIDE_QUARTERS * place + 2u] = pack_flight(flight, POINT_RECORD);
+        return FLAG_WAITING | FLAG_BESIDE;
+    }
     store_waiting(place, q0, q1, uvec4(0u));
     return FLAG_WAITING | FLAG_VOLUME;
 }
@@ -219,7 +225,8 @@ void main() {
         m = load_medium(medium);
         bool passes = m.sigma_s == vec3(0.0);
         uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
-        if (STORES_WAYS && !passes && photon.throughput != vec3(0.0)) {
+        bool has_way = !(HAS_GRIDS && m.has_grid != 0u);
+        if (STORES_WAYS && has_way && !passes && photon.throughput != vec3(0.0)) {
             float begin = max(state.start, 0.0);
             float reach = end >= FAR_AWAY ? FAR_AWAY : end - begin;
             // What comes of a way that begins at a collision is that of the plane of the way before.
@@ -290,8 +297,9 @@ void main() {
                 f.across = footprint_across(photon_medium_differentials[slot], t, photon.direction);
                 radius = event_radius(push.kernel, f.across, f.pdf, f.most);
             }
-            if (!STORES_WAYS && path_set_bounce(photon.bounce) >= push.first_deposit) {
-                flags = deposit(slot, place, photon, medium, at, radius_in(m, radius));
+            bool stores = (!STORES_WAYS || STORES_POINTS) && path_set_bounce(photon.bounce) >= push.first_deposit;
+            if (stores) {
+                flags |= deposit(slot, place, photon, medium, at, radius_in(m, radius), t - max(state.start, 0.0));
             }
             alive = scatter(slot, m, before, at, f, photon);
             state.start = 0.0;

@@ -230,7 +230,7 @@ void main() {
         }
         photon.throughput *= event.weight;
         // A way that is stored, or a plane.
-        flags = event.flags & (FLAG_WAITING | FLAG_VOLUME | FLAG_PLANE);
+        flags = event.flags & (FLAG_WAITING | FLAG_VOLUME | FLAG_BESIDE);
     }
     if (scatter(slot, place, photon, flags)) {
         flags |= FLAG_ALIVE;

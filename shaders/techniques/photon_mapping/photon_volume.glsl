@@ -12,6 +12,9 @@
 
 layout(constant_id = 55) const bool STORES_WAYS = false;  // ways of photons are stored, instead of their collisions
 layout(constant_id = 56) const bool STORES_PLANES = false;  // and a plane of each way, in place of the beams of ways that begin at a collision
+layout(constant_id = 57) const bool STORES_POINTS = false;  // and the collisions as well
+// Other records beside the ways.
+const bool STORES_BESIDE = STORES_PLANES || STORES_POINTS;
 
 // A photon's way through a homogeneous medium, with what is left of its flux along it.
 struct PhotonWay {
@@ -46,10 +49,10 @@ layout(set = 1, binding = 7, scalar) restrict buffer PhotonLandedFlags { uint ph
 layout(set = 1, binding = 8, scalar) restrict readonly buffer PhotonLandedRanks { uint photon_landed_ranks[]; };
 layout(set = 1, binding = 9, scalar) restrict buffer PhotonWays { PhotonWay photon_ways[]; };
 layout(set = 1, binding = 6, scalar) restrict buffer PhotonMediumDifferentials { Differentials photon_medium_differentials[]; };  // by slot
-// Where planes are stored: the quarters of the one that waits at a place; elsewhere as above.
-layout(set = 1, binding = 10, scalar) restrict buffer PhotonPlanes { uvec4 photon_planes[]; };
+// Where other records are stored beside ways: the quarters of the one that waits at a place; elsewhere as above.
+layout(set = 1, binding = 10, scalar) restrict buffer PhotonBeside { uvec4 photon_beside[]; };
 
 // Of a record.
-uint volume_quarters() { return STORES_PLANES ? PLANE_QUARTERS : EVENT_QUARTERS; }
+uint volume_quarters() { return STORES_BESIDE ? WIDE_QUARTERS : EVENT_QUARTERS; }
 
 #endif

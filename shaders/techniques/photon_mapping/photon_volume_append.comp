@@ -28,20 +28,20 @@ void append_way(uint place, uint event, uint pieces) {
         uint quarter = volume_quarters() * (event + i);
         photon_volume_records[quarter] = q0;
         photon_volume_records[quarter + 1u] = q1;
-        if (STORES_PLANES) {
-            photon_volume_records[quarter + 2u] = uvec4(0u);
+        if (STORES_BESIDE) {
+            photon_volume_records[quarter + 2u] = STORES_POINTS ? pack_flight(from, 0u) : uvec4(0u);
         }
     }
 }
 
-bool has_plane(uint place) {
-    return STORES_PLANES && (texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & FLAG_PLANE) != 0u;
+bool has_beside(uint place) {
+    return STORES_BESIDE && (texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL] & FLAG_BESIDE) != 0u;
 }
 
-// Two flights become a plane.
-void append_plane(uint place, uint event) {
-    for (uint i = 0u; event < push.event_capacity && i < PLANE_QUARTERS; ++i) {
-        photon_volume_records[PLANE_QUARTERS * event + i] = photon_planes[PLANE_QUARTERS * place + i];
+// What waits beside a way.
+void append_beside(uint place, uint event) {
+    for (uint i = 0u; event < push.event_capacity && i < WIDE_QUARTERS; ++i) {
+        photon_volume_records[WIDE_QUARTERS * event + i] = photon_beside[WIDE_QUARTERS * place + i];
     }
 }
 
@@ -60,10 +60,10 @@ void main() {
     uint source = WAITING_QUARTERS * place;
     uint event = push.first_event + before + rank;
     if (STORES_WAYS) {
-        uint planes = has_plane(place) ? 1u : 0u;
-        append_way(place, event, in_medium - planes);
-        if (planes != 0u) {
-            append_plane(place, event + in_medium - planes);
+        uint beside = has_beside(place) ? 1u : 0u;
+        append_way(place, event, in_medium - beside);
+        if (beside != 0u) {
+            append_beside(place, event + in_medium - beside);
         }
         // Ranks of surfaces go over the wave's earlier bounces as those of media do.
         uint landed = photon_landed_flags[waiting];

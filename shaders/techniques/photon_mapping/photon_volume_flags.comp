@@ -16,8 +16,8 @@ void main() {
     uint flags = texelFetch(walk_flags_in, int(place / FLAGS_PER_TEXEL))[place % FLAGS_PER_TEXEL];
     bool in_medium = (flags & FLAG_VOLUME) != 0u;
     uint records = in_medium ? (STORES_WAYS ? photon_ways[place].pieces : 1u) : 0u;
-    if (STORES_PLANES) {
-        records += (flags & FLAG_PLANE) != 0u ? 1u : 0u;
+    if (STORES_BESIDE) {
+        records += (flags & FLAG_BESIDE) != 0u ? 1u : 0u;
     }
     photon_volume_flags[waiting] = records;
     if (STORES_WAYS) {

@@ -22,6 +22,7 @@ mod scale;
 mod settings;
 mod sphere;
 mod traps;
+mod unified;
 mod volume;
 mod volume_kernels;
 mod volume_truths;

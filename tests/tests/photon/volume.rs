@@ -546,7 +546,12 @@ fn kernels_shrink_as_the_theory_says() {
 fn hosts_and_devices_build_the_same_maps_of_media() {
     with_gpu(|gpu| {
         let scene = lit_box(medium(4.0, 0.9, Phase::Isotropic));
-        for volume in [VolumeEstimate::Ray, VolumeEstimate::Beams, VolumeEstimate::Planes] {
+        for volume in [
+            VolumeEstimate::Ray,
+            VolumeEstimate::Beams,
+            VolumeEstimate::Planes,
+            VolumeEstimate::Unified,
+        ] {
             let of = |map_build| {
                 let settings = PhotonSettings {
                     map_build,
@@ -577,7 +582,7 @@ fn beams_that_a_quota_stops_go_through_all_records() {
             let picture = advance(&mut mapper, 2);
             (picture, mapper.counts(), mapper.eye_counters().stalls)
         };
-        for volume in [VolumeEstimate::Ray, VolumeEstimate::March] {
+        for volume in [VolumeEstimate::Ray, VolumeEstimate::March, VolumeEstimate::Unified] {
             let (whole, counts, stalls) = of(32_768, volume);
             assert_eq!(stalls, 0);
             let (stopped, stopped_counts, stalls) = of(64, volume);
@@ -684,7 +689,7 @@ fn hashed_picture(gpu: &Gpu) -> Vec<f32> {
     };
     let mut all = photons(gpu, &lit_box(uneven(coloured.clone())), &settings, 2);
     all.extend(photons(gpu, &lit_box(coloured.clone()), &settings, 2));
-    for volume in [VolumeEstimate::Beams, VolumeEstimate::Planes] {
+    for volume in [VolumeEstimate::Beams, VolumeEstimate::Planes, VolumeEstimate::Unified] {
         let ways = PhotonSettings {
             volume,
             ..settings.clone()

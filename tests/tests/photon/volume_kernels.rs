@@ -13,11 +13,12 @@ use clerestory_tests::render::{builtin, cuboid, medium};
 use clerestory_tests::with_gpu;
 use glam::{DAffine3, DVec3};
 
-const ESTIMATES: [VolumeEstimate; 4] = [
+const ESTIMATES: [VolumeEstimate; 5] = [
     VolumeEstimate::Ray,
     VolumeEstimate::March,
     VolumeEstimate::Beams,
     VolumeEstimate::Planes,
+    VolumeEstimate::Unified,
 ];
 
 fn automatic(volume: VolumeEstimate, photons: u32) -> PhotonSettings {

@@ -11,11 +11,12 @@ use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::DVec3;
 
-const ESTIMATES: [VolumeEstimate; 4] = [
+const ESTIMATES: [VolumeEstimate; 5] = [
     VolumeEstimate::Ray,
     VolumeEstimate::March,
     VolumeEstimate::Beams,
     VolumeEstimate::Planes,
+    VolumeEstimate::Unified,
 ];
 
 /// Parallel rays from `eye` along `forward`, over a square of `half_height` to either side.
@@ -57,7 +58,7 @@ fn slabs_have_the_radiance_of_the_tables() {
                 // Light is even across the rays, along which disks and beams have no width. Balls have one, and lack events beyond the faces.
                 let (volume_radius, bias) = match volume {
                     VolumeEstimate::March => (0.08, 2.5e-2),
-                    VolumeEstimate::Ray | VolumeEstimate::Beams | VolumeEstimate::Planes => (0.4, 2e-3),
+                    _ => (0.4, 2e-3),
                 };
                 let settings = PhotonSettings {
                     volume,

@@ -9,7 +9,7 @@ use clerestory::techniques::photon_mapping::kernel::{
 };
 use clerestory::techniques::photon_mapping::volume::event::{
     PhotonBeam, PhotonEvent, ball_profile, event_ends_leaf, line_profile, meet_beam, pack_beam, pack_event,
-    unpack_beam, unpack_event,
+    point_share, unpack_beam, unpack_event,
 };
 use clerestory::techniques::photon_mapping::volume::footprint::{
     EventKernelSettings, event_radius, footprint_across, log_of_one_plus, passed_differentials, scattered_in_medium,
@@ -600,7 +600,14 @@ fn beams_agree_with_their_twins() {
             let mut all = list32(&[start, start + way, color], &rest);
             all.extend(list32(
                 &[4.0 * r.vector(), ray, way],
-                &[code(r.below(3)), r.choose(&[0.0, 0.3, 0.98, 1.0])],
+                &[
+                    code(r.below(3)),
+                    r.choose(&[0.0, 0.3, 0.98, 1.0]),
+                    r.range(0.1, 10.0),
+                    r.range(0.0, 2.0),
+                    r.range(0.01, 1.0),
+                    r.range(0.01, 1.0),
+                ],
             ));
             all
         });
@@ -629,6 +636,13 @@ fn beams_agree_with_their_twins() {
             );
             assert!(
                 (f64::from(result.0[7]) - meeting.sine).abs() <= 16.0 * U,
+                "{:?}",
+                case.0
+            );
+            let share = point_share(x[22], x[23], x[24], x[25], meeting.sine);
+            // An exponential of up to twenty, and the sine of an angle above a tenth.
+            assert!(
+                (f64::from(result.0[9]) / share - 1.0).abs() <= 512.0 * U,
                 "{:?}",
                 case.0
             );

@@ -107,6 +107,7 @@ sources! {
     KIRK_ARVO_1991 = "kirk-arvo-1991": "D. Kirk, J. Arvo", "Unbiased Sampling Techniques for Image Synthesis", "SIGGRAPH", 1991;
     KNAUS_ZWICKER_2011 = "knaus-zwicker-2011": "C. Knaus, M. Zwicker", "Progressive Photon Mapping: A Probabilistic Approach", "ACM TOG 30(3)", 2011;
     KOLLIG_KELLER_2006 = "kollig-keller-2006": "T. Kollig, A. Keller", "Illumination in the Presence of Weak Singularities", "Monte Carlo and Quasi-Monte Carlo Methods 2004", 2006;
+    KRIVANEK_2014 = "krivanek-2014": "J. Křivánek et al.", "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", "ACM TOG 33(4)", 2014;
     KULLA_CONTY_2017 = "kulla-conty-2017": "C. Kulla, A. Conty", "Revisiting Physically Based Shading at Imageworks", "SIGGRAPH course notes", 2017;
     KULLA_FAJARDO_2012 = "kulla-fajardo-2012": "C. Kulla, M. Fajardo", "Importance Sampling Techniques for Path Tracing in Participating Media", "EGSR", 2012;
     KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;

@@ -159,7 +159,7 @@ impl PhotonMapper {
             });
         }
         let has_media = scene.profile().media.any();
-        if has_media && settings.stores_ways() && scene.profile().media.heterogeneous {
+        if has_media && settings.volume.needs_homogeneous_media() && scene.profile().media.heterogeneous {
             let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\" or \"march\"";
             return Err(Error::setting("volume", settings.volume.word(), cause));
         }
@@ -371,6 +371,7 @@ impl PhotonMapper {
                         map,
                         radius: event_kernel.length_max,
                         plane_share,
+                        path_share,
                     }),
                     watts,
                     nearest,
@@ -430,7 +431,7 @@ impl PhotonMapper {
 
     /// Traces the photons of a pass, and returns their collisions with media that are stored, in the order of waves, in each of bounces and photons. The picture is
     /// not touched, and counts go on. With [`VolumeEstimate::Beams`](super::volume::VolumeEstimate::Beams) and
-    /// [`VolumeEstimate::Planes`](super::volume::VolumeEstimate::Planes) there are none.
+    /// [`VolumeEstimate::Planes`](super::volume::VolumeEstimate::Planes) there are none, with [`VolumeEstimate::Unified`](super::volume::VolumeEstimate::Unified) they are not told from ways.
     ///
     /// # Errors
     /// As [`PhotonMapper::step`].

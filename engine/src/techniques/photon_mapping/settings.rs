@@ -130,7 +130,8 @@ crate::settings! {
         /// Eye paths per pixel that query the same map.
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
         /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or, in homogeneous
-        /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there.
+        /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there; or collisions and ways together, each
+        /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
         /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;

@@ -52,6 +52,8 @@ pub(in crate::techniques::photon_mapping) struct BeamStage<'a> {
     pub radius: f32,
     /// Share of ways that have planes.
     pub plane_share: f32,
+    /// Radius of collisions over the mean free path of their medium, at most; 0 for any.
+    pub path_share: f32,
 }
 
 /// Which eye paths ask, and for what.
@@ -96,6 +98,7 @@ impl Beam {
             marches: settings.volume == VolumeEstimate::March,
             beams: settings.volume.stores_ways(),
             planes: settings.volume.stores_planes(),
+            points: settings.volume.stores_points(),
             compact_quota: settings.query_quota.min(BEAM_QUOTA),
             counts_bounces,
             has_classes: classes.is_some(),
@@ -187,6 +190,7 @@ impl BeamStage<'_> {
             most_bounces: self.beam.bounces[1],
             scale: self.scale,
             radius: self.radius,
+            path_share: self.path_share,
             plane_weight: 1.0 / self.plane_share,
             classes: self.beam.classes,
             ..Default::default()

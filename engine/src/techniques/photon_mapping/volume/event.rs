@@ -13,6 +13,7 @@ use crate::maps::packed_direction::{pack_octahedral, unpack_octahedral};
 use crate::techniques::photon_mapping::kernel::KernelProfile;
 use crate::transport::packing::{pack_rgb9e5, unpack_rgb9e5};
 use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
 
 /// Words of a record.
 pub type EventWords = [[u32; 4]; EVENT_QUARTERS as usize];
@@ -106,6 +107,16 @@ pub fn unpack_beam(words: &EventWords) -> PhotonBeam {
     }
 }
 
+/// Share that the estimate by collisions has of light that one by beams has, too, in media of a mean extinction, 1/m: the balance heuristic.
+///
+/// A photon collides within the disk of a ray with the density of its flight, of this length, times the disk's area; its beam passes within a width of both sides, seen at an angle of this
+/// sine. Radii and lengths in metres.
+pub fn point_share(extinction: f64, flight: f64, point_radius: f64, beam_radius: f64, sine: f64) -> f64 {
+    let points = extinction * (-extinction * flight).exp() * PI * point_radius * point_radius;
+    let both = points + 2.0 * beam_radius * sine;
+    if both > 0.0 { points / both } else { 1.0 }
+}
+
 /// Kernel of one dimension, of the squared distance in units of the radius: over a radius on both sides it integrates to one.
 pub fn line_profile(profile: KernelProfile, d2: f64) -> f64 {
     let k = match profile {
@@ -175,9 +186,27 @@ mod tests {
     use crate::test_random::Random;
     use crate::transport::phase::phase_function;
     use glam::DVec3;
-    use std::f64::consts::PI;
 
     const PROFILES: [KernelProfile; 3] = [KernelProfile::Uniform, KernelProfile::Cone, KernelProfile::Epanechnikov];
+
+    #[test]
+    fn shares_of_collisions_are_those_of_the_balance_heuristic() {
+        let mut random = Random(6);
+        for _ in 0..200 {
+            let unit = |random: &mut Random| f64::from(random.unit()).max(1e-3);
+            let (extinction, flight) = (20.0 * unit(&mut random), 3.0 * unit(&mut random));
+            let (of_points, of_beams, sine) = (unit(&mut random), unit(&mut random), unit(&mut random));
+            let share = point_share(extinction, flight, of_points, of_beams, sine);
+            // Expected meetings of a ray's piece of a metre: collisions in its cylinder, and beams in the strip that is seen of it, of photons of the same density.
+            let collisions = extinction * (-extinction * flight).exp() * PI * of_points.powi(2);
+            let beams = 2.0 * of_beams * sine;
+            assert!((share * (collisions + beams) - collisions).abs() < 1e-12 * collisions);
+            assert!(point_share(extinction, flight, of_points, of_beams, 0.0) > 1.0 - 1e-12);
+        }
+        // Neither underflow nor a ray along a beam leaves light out.
+        assert_eq!(point_share(1e3, 1e3, 0.1, 0.1, 0.0), 1.0);
+        assert_eq!(point_share(1e3, 1e3, 0.1, 0.1, 0.5), 0.0);
+    }
 
     #[test]
     fn records_come_back() {

@@ -17,7 +17,7 @@ use crate::accel::photon_map::complete_bvh::CompleteBvh;
 use crate::accel::photon_map::device::{MapBuffers, MapBuilder};
 use crate::accel::photon_map::merge::merged_hierarchy;
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{COMPACT_NOTHING, EVENT_LEAF_END, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE};
+use crate::gpu::shaders::constants::{COMPACT_NOTHING, EVENT_LEAF_END, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE, POINT_RECORD};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_event_boxes, photon_event_leaves};
 use crate::gpu::shaders::types::CompactRoot;
 use crate::gpu::{Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Submission, TexelView};
@@ -66,15 +66,21 @@ impl EventMaps {
     /// As [`Gpu::compute_pipeline`].
     pub fn new(gpu: &Gpu, settings: &PhotonSettings) -> Result<Self> {
         let (build, estimate) = (settings.map_build, settings.volume);
-        let (beams, planes) = (estimate.stores_ways(), estimate.stores_planes());
+        let (beams, planes, points) = (
+            estimate.stores_ways(),
+            estimate.stores_planes(),
+            estimate.stores_points(),
+        );
         let by_neighbors = settings.volume_kernel == VolumeKernel::Neighbor;
         let device = match build {
             _ if by_neighbors => None,
             MapBuild::Host => None,
             MapBuild::Auto | MapBuild::Device => Some(DeviceEventMaps {
                 builder: MapBuilder::new(gpu)?,
-                boxes: gpu.compute_pipeline(&photon_event_boxes::Spec { beams, planes })?,
-                leaves: gpu.compute_pipeline(&photon_event_leaves::Spec { planes })?,
+                boxes: gpu.compute_pipeline(&photon_event_boxes::Spec { beams, planes, points })?,
+                leaves: gpu.compute_pipeline(&photon_event_leaves::Spec {
+                    wide: estimate.stores_beside(),
+                })?,
                 memory: None,
                 quarters: estimate.quarters(),
             }),
@@ -193,12 +199,14 @@ impl EventMaps {
 /// The box of a record; that of a beam has a radius.
 fn box_of(estimate: VolumeEstimate, record: &[[u32; 4]], radius: f32) -> Aabb {
     let words: EventWords = [record[0], record[1]];
-    if !estimate.stores_ways() {
+    let is_point = |quarter: &[u32; 4]| quarter[3] == POINT_RECORD;
+    if !estimate.stores_ways() || estimate.stores_points() && record.get(2).is_some_and(is_point) {
         let event = unpack_event(&words);
         return event_box(event.position, event.position, event.radius);
     }
     let beam = unpack_beam(&words);
-    let second = record.get(2).map_or(Vec3::ZERO, |[x, y, z, _]| {
+    let plane = record.get(2).filter(|_| estimate.stores_planes());
+    let second = plane.map_or(Vec3::ZERO, |[x, y, z, _]| {
         Vec3::from_array([*x, *y, *z].map(f32::from_bits))
     });
     if second != Vec3::ZERO {

@@ -24,7 +24,7 @@ pub(super) use plane_rays::SWEEPS_MAX;
 pub(super) use trace::{Room, VolumeOptions, VolumePass, VolumeTrace};
 
 use crate::catalogue::{Bias, Role, Row, sources};
-use crate::gpu::shaders::constants::{EVENT_QUARTERS, PLANE_QUARTERS};
+use crate::gpu::shaders::constants::{EVENT_QUARTERS, WIDE_QUARTERS};
 
 /// How events are seen along eye paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -36,6 +36,8 @@ pub enum VolumeEstimate {
     Beams,
     /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else.
     Planes,
+    /// Collisions and, in homogeneous media, ways: disks and beams, each weighted by what the other has of the same light (balance heuristic).
+    Unified,
     /// Balls at places of the ray that lie as far apart as they are wide, from a first one by chance.
     March,
 }
@@ -45,15 +47,30 @@ impl VolumeEstimate {
     pub(super) fn dimensions(self) -> f64 {
         match self {
             // What planes leave is seen by beams.
-            Self::Beams | Self::Planes => 1.0,
+            Self::Beams | Self::Planes | Self::Unified => 1.0,
             Self::Ray => 2.0,
             Self::March => 3.0,
         }
     }
 
-    /// Whether the ways of photons are stored, instead of their collisions.
+    /// Whether the ways of photons are stored, instead of their collisions or beside them.
     pub(super) fn stores_ways(self) -> bool {
+        matches!(self, Self::Beams | Self::Planes | Self::Unified)
+    }
+
+    /// Whether it sees nothing in media with a density grid.
+    pub(super) fn needs_homogeneous_media(self) -> bool {
         matches!(self, Self::Beams | Self::Planes)
+    }
+
+    /// And collisions beside the ways.
+    pub(super) fn stores_points(self) -> bool {
+        self == Self::Unified
+    }
+
+    /// Whether a map has records of another kind beside beams.
+    fn stores_beside(self) -> bool {
+        self.stores_planes() || self.stores_points()
     }
 
     /// And planes instead of those that begin at a collision.
@@ -63,8 +80,8 @@ impl VolumeEstimate {
 
     /// Words of its records, over four.
     fn quarters(self) -> u32 {
-        if self.stores_planes() {
-            PLANE_QUARTERS
+        if self.stores_beside() {
+            WIDE_QUARTERS
         } else {
             EVENT_QUARTERS
         }
@@ -76,6 +93,7 @@ impl VolumeEstimate {
             Self::Ray => "ray",
             Self::Beams => "beams",
             Self::Planes => "planes",
+            Self::Unified => "unified",
             Self::March => "march",
         }
     }
@@ -168,6 +186,28 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
             "tests/tests/photon/volume_kernels.rs::beams_have_no_kernels_of_their_own",
             "tests/tests/photon/volume_truths.rs::slabs_have_the_radiance_of_the_tables",
+            "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
+        ],
+        settings: &["volume"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "CL-PHOTON-UNIFIED",
+        name: "photon collisions and beams together, weighted by the balance heuristic",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Points and beams alone, where eye paths first scatter: eye paths that go on, and planes, are not weighted against them; one radius for both; in grids collisions alone.",
+        sources: &[sources::KRIVANEK_2014.whole(), sources::VEACH_1997.at("9.2.2")],
+        bias: Some(BIAS),
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_event.glsl",
+            "shaders/techniques/photon_mapping/photon_medium.comp",
+        ],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/event.rs::shares_of_collisions_are_those_of_the_balance_heuristic",
+            "tests/tests/photon/unified.rs::unified_estimates_agree_with_the_path_tracer",
+            "tests/tests/photon/unified.rs::errors_are_near_to_those_of_the_better_estimate",
+            "tests/tests/photon/volume_truths.rs::rays_past_a_source_have_the_exact_multiple_scattering",
             "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
         ],
         settings: &["volume"],

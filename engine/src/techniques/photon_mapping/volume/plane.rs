@@ -8,11 +8,11 @@
 //! the variance of what one ray sees grows with the logarithm of the number of planes.
 
 use super::event::{PhotonBeam, pack_beam, unpack_beam};
-use crate::gpu::shaders::constants::PLANE_QUARTERS;
+use crate::gpu::shaders::constants::WIDE_QUARTERS;
 use glam::{DVec3, Vec3};
 
 /// Words of a record of a map that has planes, beams among them: 48 bytes.
-pub type PlaneWords = [[u32; 4]; PLANE_QUARTERS as usize];
+pub type PlaneWords = [[u32; 4]; WIDE_QUARTERS as usize];
 
 /// Two flights of a photon.
 #[derive(Debug, Clone, Copy, PartialEq)]

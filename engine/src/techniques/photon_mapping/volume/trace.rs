@@ -81,8 +81,8 @@ pub(in crate::techniques::photon_mapping) struct VolumeTrace {
     scratch: Buffer,
     /// Only where ways are stored: flags and ranks of deposits on surfaces, and the ways by place.
     ways: Option<[Buffer; 3]>,
-    /// Only where planes are stored: those that wait, by place.
-    planes: Option<Buffer>,
+    /// Only where other records are stored beside ways: those that wait, by place.
+    beside: Option<Buffer>,
     /// Of a record.
     quarters: u32,
     events: TexelView,
@@ -97,7 +97,9 @@ impl VolumeTrace {
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::LimitExceeded`] for media of numbers that records cannot hold.
     pub fn new(gpu: &Gpu, scene: &GpuScene, plan: &PhotonPlan, options: VolumeOptions, slots: u32) -> Result<Self> {
-        let (stores_ways, stores_planes) = (options.estimate.stores_ways(), options.estimate.stores_planes());
+        let estimate = options.estimate;
+        let (stores_ways, stores_planes) = (estimate.stores_ways(), estimate.stores_planes());
+        let stores_points = estimate.stores_points();
         let quarters = options.estimate.quarters();
         let profile = scene.profile();
         let media = profile.media.count as u64;
@@ -119,6 +121,7 @@ impl VolumeTrace {
             has_classes: options.has_classes,
             stores_ways,
             stores_planes,
+            stores_points,
             ..Default::default()
         };
         let work = |name: &str, bytes: u64| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work));
@@ -131,13 +134,16 @@ impl VolumeTrace {
             flags: gpu.compute_pipeline(&photon_volume_flags::Spec {
                 stores_ways,
                 stores_planes,
+                stores_points,
             })?,
             append: gpu.compute_pipeline(&photon_volume_append::Spec {
                 stores_ways,
                 stores_planes,
+                stores_points,
             })?,
-            planes: stores_planes
-                .then(|| work("photon planes", u64::from(slots) * size_of::<PlaneWords>() as u64))
+            beside: estimate
+                .stores_beside()
+                .then(|| work("photons beside ways", u64::from(slots) * size_of::<PlaneWords>() as u64))
                 .transpose()?,
             ways: if stores_ways {
                 let bytes = u64::from(slots) * size_of::<types::PhotonWay>() as u64;
@@ -190,7 +196,7 @@ impl VolumeTrace {
             photon_landed_flags: of_ways(0),
             photon_landed_ranks: of_ways(1),
             photon_ways: of_ways(2),
-            photon_planes: self.planes.as_ref().unwrap_or(&self.counters).view(),
+            photon_beside: self.beside.as_ref().unwrap_or(&self.counters).view(),
         }
     }
 

@@ -1,0 +1,88 @@
+//! Collisions and ways of photons weighted together: the path tracer's light where each alone is good and where it is not, and errors near to those of the better one.
+
+use super::volume::{airlight, lit_box, uneven};
+use super::*;
+use clerestory::scene::{Medium, Phase};
+use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
+use clerestory_tests::render::{builtin, medium};
+use clerestory_tests::with_gpu;
+
+fn with(volume: VolumeEstimate, set: &str, photons: u32) -> PhotonSettings {
+    PhotonSettings {
+        volume,
+        volume_radius: 0.02,
+        radius: 0.1,
+        photons,
+        ..settings(set)
+    }
+}
+
+#[test]
+fn unified_estimates_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        // Bands that come differently far; in a grid collisions alone; thin and dense.
+        let coloured = Medium {
+            sigma_s: Vec3::new(1.0, 2.0, 4.0),
+            sigma_a: Vec3::new(0.5, 0.2, 0.1),
+            phase: Phase::HenyeyGreenstein { g: 0.5 },
+            ..Medium::default()
+        };
+        for scene in [
+            lit_box(coloured),
+            lit_box(uneven(medium(4.0, 0.8, Phase::Isotropic))),
+            lit_box(medium(0.3, 0.9, Phase::Isotropic)),
+            lit_box(medium(12.0, 0.9, Phase::Isotropic)),
+        ] {
+            // As of beams in one box (`volume.rs`).
+            let unified = with(VolumeEstimate::Unified, "bounces=2..4", 1 << 12);
+            let counts = expect_agreement(gpu, &scene, &unified, [16, 1024], [1.5e-2; 3]);
+            assert!(counts.beams.photons > 1000);
+        }
+    });
+}
+
+/// Mean squared error of a picture of some passes, beyond that of the truth itself.
+fn error(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, truth: &Rendered) -> f64 {
+    const PASSES: u32 = 4;
+    const SEEDS: u32 = 3;
+    let own: f64 = truth.variance.iter().map(|variance| f64::from(*variance)).sum();
+    let squared = (0..SEEDS).map(|seed| {
+        let settings = PhotonSettings {
+            seed,
+            ..settings.clone()
+        };
+        let found = photons(gpu, scene, &settings, PASSES);
+        let off = found.iter().zip(&truth.radiance);
+        off.map(|(found, expected)| f64::from(found - expected).powi(2))
+            .sum::<f64>()
+            - own
+    });
+    squared.sum::<f64>() / f64::from(SEEDS)
+}
+
+#[test]
+fn errors_are_near_to_those_of_the_better_estimate() {
+    with_gpu(|gpu| {
+        // Fog in which a mean free path is much longer, and much shorter, than what is seen of it.
+        for (scene, set) in [
+            (airlight(0.0, 0.1, 1.0), "bounces=2..3"),
+            (lit_box(medium(25.0, 0.9, Phase::Isotropic)), "bounces=2..3"),
+            (builtin("builtin:fog-box?sphere=glass"), "L.*VE"),
+        ] {
+            let truth = traced(gpu, &scene, set, 2048);
+            let [points, beams, unified] =
+                [VolumeEstimate::Ray, VolumeEstimate::Beams, VolumeEstimate::Unified].map(|volume| {
+                    let automatic = PhotonSettings {
+                        volume_radius: 0.05,
+                        ..with(volume, set, 1 << 12)
+                    };
+                    error(gpu, &scene, &automatic, &truth)
+                });
+            println!(
+                "{}: MSE {points:.3e} of collisions, {beams:.3e} of beams, {unified:.3e} of both",
+                scene.name
+            );
+            assert!(unified <= 1.5 * points.min(beams), "{}", scene.name);
+        }
+    });
+}
