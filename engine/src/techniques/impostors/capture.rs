@@ -42,7 +42,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaptureBy {
-    /// By rasterization where points and spots alone emit light, nothing is there in part and shadow maps fit, by rays elsewhere.
+    /// By rasterization where points, spots and directional lights alone emit light, nothing is there in part and shadow maps fit, by rays elsewhere.
     #[default]
     Auto,
     /// By rasterization with shadow maps: light of points, spots and directions, scattered once.
@@ -101,12 +101,13 @@ impl CaptureBy {
                 "a rasterized map has one layer of surfaces; capture by rays finds those behind it",
             ),
             (
-                placed > SHADOW_MAPS_MAX as usize || placed + profile.lights.directional > LIGHTS_MAX,
+                placed.max(profile.lights.directional) > SHADOW_MAPS_MAX as usize
+                    || placed + profile.lights.directional > LIGHTS_MAX,
                 "there are more lights than rasterized maps have; capture by rays takes all",
             ),
         ]);
         // What it draws otherwise than it is.
-        let is_off = profile.lights.directional > 0 || profile.alpha.blend;
+        let is_off = profile.alpha.blend;
         let fit = || shadows_of_side(shadow_side).fit(gpu, LightRoom::of(&scene.lights_without_area()));
         match self {
             Self::Auto if reasons.is_empty() && !is_off && fit().is_ok() => Ok(Self::Raster),
