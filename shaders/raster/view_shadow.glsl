@@ -1,5 +1,5 @@
-// Shadow maps of lights that one view covers, spots and parallel light: where a receiver is in the map, from where on along a texel's ray it is in shadow, and the share of its
-// light that a square of texels lets through. Sources and guarantees: raster/view_shadow.rs.
+// Shadow maps of lights that one view covers, spots and parallel light: where a receiver is in the map, from where on along a texel's ray it is in shadow; look-ups are in
+// raster/view_shadow_set.glsl. Sources and guarantees: raster/view_shadow.rs.
 #ifndef CLERESTORY_RASTER_VIEW_SHADOW_GLSL
 #define CLERESTORY_RASTER_VIEW_SHADOW_GLSL
 

@@ -7,7 +7,7 @@
 //! along each texel's ray, which is moved for folds by texels at its distance, so that no constant has a unit of length; and biases are the same. Filters are as wide as
 //! there, in texels, and cost their square. What a map does not show is lit: beyond a spot's cone there is no light, and a beam's square holds all of the scene.
 //!
-//! Deterministic. GLSL: `raster/view_shadow.glsl`; the twin of a look-up is [`ViewShadowImage::visibility`].
+//! Deterministic. GLSL: `raster/view_shadow.glsl` and `raster/view_shadow_set.glsl`; the twin of a look-up is [`ViewShadowImage::visibility`].
 
 use glam::{DVec2, DVec3, IVec2, Vec3};
 

@@ -319,6 +319,8 @@ impl Stage {
 
     fn open(&self, size: [u32; 2]) -> Result<View> {
         let (gpu, scene) = (&self.gpu, &self.on_device);
+        let is_sun = |light: &&LightKind| matches!(light, LightKind::Directional { .. });
+        let suns = self.lights.iter().filter(is_sun).count() as u32;
         let mut preview = Preview::new(
             gpu,
             scene,
@@ -326,7 +328,7 @@ impl Stage {
                 size,
                 samples: self.settings.samples,
                 lights: self.lights.len() as u32,
-                shadows: self.settings.shadows,
+                shadows: self.settings.shadows.map(|shadows| PreviewShadows { suns, ..shadows }),
                 has_probes: true,
             },
         )

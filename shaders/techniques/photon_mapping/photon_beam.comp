@@ -16,7 +16,7 @@
 //
 // PM-VOL-5, PM-VOL-7: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.2.4 and 7.1; W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate
 // for Volumetric Photon Mapping", 2008; W. Jarosz, D. Nowrouzezahrai, I. Sadeghi and H. W. Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon
-// Points and Beams", 2011; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", 2017. Deterministic in (seed, pixel, sample) and the map.
+// Points and Beams", 2011; J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", 2014; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", 2017. Deterministic in (seed, pixel, sample) and the map.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -67,8 +67,7 @@ layout(push_constant, scalar) uniform Push {
     uint least_bounces;  // scatterings in all, with that of the event
     uint most_bounces;
     float scale;         // of stored fluxes
-    float radius;        // of beams, and of collisions that no mean free path bounds
-    float path_share;    // of the latter over the mean free path, at most; 0 for any
+    float radius;        // of beams, and of collisions beside them
     float plane_weight;  // of planes' fluxes, beside the scale
     uint first_place;    // of LINEAR
     uint first;          // of the records that a linear query goes through
@@ -145,14 +144,8 @@ bool counts_here(uint medium, uint history) {
     return counts;
 }
 
-// Of collisions here, as they were stored (photon_medium.comp).
-float point_radius() {
-    float densest = largest_component(beam.m.sigma_t);
-    return push.path_share > 0.0 ? min(push.radius, push.path_share / densest) : push.radius;
-}
-
-float share_of_points(float flight, float radius, float sine) {
-    return point_share(mean_extinction(beam.m.sigma_t), flight, radius, push.radius, sine);
+float share_of_points(float flight, float sine) {
+    return point_share(mean_extinction(beam.m.sigma_t), flight, push.radius, push.radius, sine);
 }
 
 // Adds a beam's light where the ray passes it.
@@ -169,7 +162,7 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
             float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
             weight *= phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
             if (POINTS) {
-                weight *= 1.0 - share_of_points(unpack_flight(q2) + at.along, point_radius(), at.sine);
+                weight *= 1.0 - share_of_points(unpack_flight(q2) + at.along, at.sine);
             }
             ++gathered_events;
             gathered += weight * beam.m.sigma_s * passed * b.flux;
@@ -242,7 +235,7 @@ bool compact_visit_beam(uint record) {
             PhotonEvent e = unpack_event(q0, q1);
             // In grids there are no beams.
             if (POINTS && !(HAS_GRIDS && beam.m.has_grid != 0u)) {
-                weight *= share_of_points(unpack_flight(q2), radius, length(cross(e.direction, beam.direction)));
+                weight *= share_of_points(unpack_flight(q2), length(cross(e.direction, beam.direction)));
             }
             ++gathered_events;
             gathered += weight * phase_function(beam.m.phase, beam.m.phase_parameter, e.direction, -beam.direction) * e.flux;

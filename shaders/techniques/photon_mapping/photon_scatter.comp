@@ -229,7 +229,7 @@ void main() {
             return;
         }
         photon.throughput *= event.weight;
-        // A way that is stored, or a plane.
+        // A way that is stored, and what waits beside it.
         flags = event.flags & (FLAG_WAITING | FLAG_VOLUME | FLAG_BESIDE);
     }
     if (scatter(slot, place, photon, flags)) {

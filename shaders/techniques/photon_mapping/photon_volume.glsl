@@ -10,7 +10,7 @@
 
 // descriptor set 1: PhotonVolumeSet
 
-layout(constant_id = 55) const bool STORES_WAYS = false;  // ways of photons are stored, instead of their collisions
+layout(constant_id = 55) const bool STORES_WAYS = false;  // ways of photons are stored, instead of their collisions or beside them
 layout(constant_id = 56) const bool STORES_PLANES = false;  // and a plane of each way, in place of the beams of ways that begin at a collision
 layout(constant_id = 57) const bool STORES_POINTS = false;  // and the collisions as well
 // Other records beside the ways.
@@ -31,7 +31,7 @@ struct PhotonWay {
 
 layout(set = 1, binding = 0, scalar) restrict buffer PhotonMediumCounters {
     uint absorbed;  // photons that a collision has ended
-    uint events;    // collisions that were stored
+    uint events;    // records that were stored: collisions, pieces of ways, planes
 } photon_medium_counters;
 // Of the wave; its first stage of a bounce keeps it.
 layout(set = 1, binding = 1, scalar) restrict buffer PhotonVolumeQueue {

@@ -269,6 +269,33 @@ fn area_lights_and_skies_are_mirrored_by_rays() {
     });
 }
 
+#[test]
+fn maps_of_places_under_a_sun_are_drawn_with_its_shadows() {
+    with_gpu(|gpu| {
+        const SIZE: u32 = 24;
+        let mut scene = room_with(mirror(), DVec3::ZERO, RADIUS, EYE, 1.0, 1.0);
+        scene.lights.clear();
+        // The wall at +y is gone, so that the others shade each other.
+        scene.instances.remove(2);
+        let direction = Vec3::new(0.5, -1.0, 0.3).normalize();
+        let irradiance = Vec3::new(3.0, 2.5, 2.0);
+        scene.add_light("sun", LightKind::Directional { direction, irradiance });
+        let renderer = renderer(gpu, &scene);
+        let by = |capture: &str| {
+            let settings = json!({"side": 256, "shadow_side": 1024, "capture": capture, "sampler": "pcg"});
+            rendered(&renderer, "impostor", SIZE, 64, settings)
+        };
+        let [chosen, by_rays] = ["auto", "rays"].map(by);
+        assert_eq!(chosen.report.counters["map_paths"], 0);
+        assert!(by_rays.report.counters["map_paths"] > 0);
+        let on = pixels_of_sphere(&scene, SIZE, DVec3::ZERO, RADIUS, true);
+        let [off, bias] = errors_beyond_noise(&chosen, &by_rays, &on);
+        println!("sun in a mirror: {off:.4}, bias {bias:+.4}");
+        // Borders of shadows; without shadows the bias is a third.
+        assert!(off < 0.15 && bias.abs() < 0.03, "{off} {bias}");
+    });
+}
+
 /// A room of 100 km, one of a tenth of a millimetre, and one of metres give the same picture.
 #[test]
 fn scale_changes_nothing() {

@@ -514,6 +514,8 @@ fn kernels_shrink_as_the_theory_says() {
         for (volume, exponent) in [
             (VolumeEstimate::Beams, 1.0),
             (VolumeEstimate::Ray, 2.0),
+            // As of collisions, which stand alone in grids.
+            (VolumeEstimate::Unified, 2.0),
             (VolumeEstimate::March, 3.0),
         ] {
             let settings = PhotonSettings {

@@ -211,8 +211,8 @@ fn rough_reflections_are_close_to_the_path_tracers() {
     });
 }
 
-/// A floor and a block under a point, a spot and a directional light, one at a time.
-fn lit_block(light: LightKind) -> Scene {
+/// A floor and a block under these lights.
+fn lit_block(lights: &[LightKind]) -> Scene {
     let mut scene = Scene::default();
     let matte = scene.add_material(Material::lambert("matte", Vec3::new(0.7, 0.5, 0.3)));
     let glossy = scene.add_material(Material {
@@ -228,7 +228,9 @@ fn lit_block(light: LightKind) -> Scene {
         Vec3::new(-0.3, 0.0, -0.3),
         Vec3::new(0.2, 0.5, 0.1),
     ));
-    scene.add_light("light", light);
+    for light in lights {
+        scene.add_light("light", *light);
+    }
     scene.cameras.push(camera_aslant());
     scene
 }
@@ -240,29 +242,29 @@ fn direct_light_is_the_path_tracers() {
         let position = Vec3::new(-0.8, 1.2, 0.6);
         let direction = (Vec3::new(0.1, 0.0, 0.0) - position).normalize();
         let intensity = Vec3::new(3.0, 2.5, 2.0);
-        let lights = [
-            LightKind::Point { position, intensity },
-            LightKind::Spot {
-                position,
-                direction,
-                intensity,
-                inner: 0.2,
-                outer: 0.5,
-            },
-            LightKind::Directional {
-                direction,
-                irradiance: intensity,
-            },
-        ];
-        for light in lights {
-            let scene = lit_block(light);
+        let point = LightKind::Point { position, intensity };
+        let spot = LightKind::Spot {
+            position,
+            direction,
+            intensity,
+            inner: 0.2,
+            outer: 0.5,
+        };
+        let sun = |direction: Vec3| LightKind::Directional {
+            direction: direction.normalize(),
+            irradiance: intensity,
+        };
+        let suns = [sun(direction), sun(Vec3::new(-0.7, -1.0, 0.4))];
+        // Each by itself; and together, each by the map of its own.
+        for lights in [&[point][..], &[spot], &suns[..1], &[suns[0], point, suns[1], spot]] {
+            let scene = lit_block(lights);
             let traced = render(gpu, &scene, SIZE, 64, &paths("direct"));
             for layout in ShadowLayout::ALL {
                 let shadows = PreviewShadows {
                     layout,
                     side: layout.side_for(6 * 256 * 256),
                     width: 1,
-                    suns: 1,
+                    suns: 2,
                 };
                 let found = pixels(&picture(gpu, &scene, 8, Some(shadows)));
                 let mut off = Vec::new();
@@ -273,10 +275,10 @@ fn direct_light_is_the_path_tracers() {
                 let mean = traced.mean().map(|(mean, _)| mean).iter().sum::<f64>() / 3.0;
                 off.sort_by(f64::total_cmp);
                 let [median, high] = [0.5, 0.97].map(|share| off[(share * off.len() as f64) as usize] / mean);
-                println!("{light:?}, {}: median {median:.2e}, 97 % {high:.2e}", layout.name());
+                println!("{lights:?}, {}: median {median:.2e}, 97 % {high:.2e}", layout.name());
                 // Pixels of one surface differ by where samples lie; those with edges by the noise of samples.
-                assert!(median < 0.01, "{light:?}, {}: {median}", layout.name());
-                assert!(high < 0.25, "{light:?}, {}: {high}", layout.name());
+                assert!(median < 0.01, "{lights:?}, {}: {median}", layout.name());
+                assert!(high < 0.25, "{lights:?}, {}: {high}", layout.name());
             }
         }
     });

@@ -249,7 +249,7 @@ fn mistakes_are_refused() {
     });
 }
 
-/// What is not asked for costs nothing: no shadow maps without lights that have a place.
+/// What is not asked for costs nothing: no shadow maps without lights that have a place, or directional ones of which a host wants them.
 #[test]
 fn passes_are_those_that_are_needed() {
     with_gpu(|gpu| {

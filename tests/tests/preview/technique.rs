@@ -74,6 +74,13 @@ fn pictures_come_to_be_the_path_tracers() {
                 intensity: Vec3::new(3.0, 2.5, 2.0),
             },
         );
+        lit.add_light(
+            "sun",
+            LightKind::Directional {
+                direction: Vec3::new(-0.4, -1.0, -0.2).normalize(),
+                irradiance: Vec3::new(1.0, 1.2, 1.5),
+            },
+        );
         let renderer = Renderer::new(gpu, &lit).unwrap();
         let paths = techniques::by_id("preview").unwrap().path_set.to_string();
         assert_eq!(paths, "bounces=0..1");
@@ -81,7 +88,7 @@ fn pictures_come_to_be_the_path_tracers() {
         let found = rendered(&renderer, "preview", json!({"path_set": paths}), 64);
         assert_eq!(found.report.path_set, expected.report.path_set);
         assert_eq!(found.report.samples, [64; 2]);
-        assert_eq!(found.report.counters["lights_drawn"], 1);
+        assert_eq!(found.report.counters["lights_drawn"], 2);
         assert_eq!(found.report.counters["frames"], 64);
         let [median, high] = off(&found, &expected);
         // Edges of shadows and of the block are out of focus in both.

@@ -22,7 +22,7 @@ use super::peel::Layers;
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::constants::PACKED_NORMAL_BITS;
 use crate::gpu::shaders::maps::{directional_border, directional_coarser};
-use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert};
+use crate::gpu::shaders::raster::{surface_frag, surface_octant_vert, surface_vert};
 use crate::gpu::shaders::techniques::path::path_directions;
 use crate::gpu::shaders::techniques::preview::preview_shade;
 use crate::gpu::shaders::types::SceneTriangle;
@@ -55,10 +55,11 @@ pub enum CaptureBy {
 pub(in crate::techniques) const NEEDS: &[&str] = &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"];
 
 /// What a map may take, beside what eye paths do.
-pub(in crate::techniques) const KERNELS: [&ShaderInfo; 6] = [
+pub(in crate::techniques) const KERNELS: [&ShaderInfo; 7] = [
     &path_directions::INFO,
     &preview_shade::INFO,
     &surface_octant_vert::INFO,
+    &surface_vert::INFO,
     &surface_frag::INFO,
     &directional_coarser::INFO,
     &directional_border::INFO,
@@ -66,8 +67,6 @@ pub(in crate::techniques) const KERNELS: [&ShaderInfo; 6] = [
 
 /// Of the paths of all maps: their noise is the same in all samples and in pictures of all seeds, so that pilot pictures show it as the bias that it is.
 const CAPTURE_SEED: u32 = 0x6d61_7021;
-/// Lights that are drawn, at most: their records go into the command buffer.
-const LIGHTS_MAX: usize = 1024;
 
 impl CaptureBy {
     /// What it is for a scene, the numbers of bounces and of layers that are wanted, and a side of shadow maps.
@@ -101,8 +100,7 @@ impl CaptureBy {
                 "a rasterized map has one layer of surfaces; capture by rays finds those behind it",
             ),
             (
-                placed.max(profile.lights.directional) > SHADOW_MAPS_MAX as usize
-                    || placed + profile.lights.directional > LIGHTS_MAX,
+                placed.max(profile.lights.directional) > SHADOW_MAPS_MAX as usize,
                 "there are more lights than rasterized maps have; capture by rays takes all",
             ),
         ]);

@@ -158,6 +158,7 @@ const ROWS: &[Row] = &[
             "shaders/techniques/path/path_directions.comp",
             "shaders/techniques/preview/preview_shade.comp",
             "shaders/raster/surface_octant.vert",
+            "shaders/raster/surface.vert",
         ],
         bias: Some(Bias::Biased(
             "radiance at texels' middles; the preview's shadows where it is drawn",
@@ -166,6 +167,7 @@ const ROWS: &[Row] = &[
         tests: &[
             "engine/src/techniques/impostors/draw.rs::parts_are_all_but_what_is_left_out",
             "tests/tests/impostor_pictures/reflections.rs::area_lights_and_skies_are_mirrored_by_rays",
+            "tests/tests/impostor_pictures/reflections.rs::maps_of_places_under_a_sun_are_drawn_with_its_shadows",
             "tests/tests/impostor_pictures/reflections.rs::scale_changes_nothing",
             "tests/tests/impostor_pictures/edge_cases.rs::without_a_reflector_there_is_no_map",
             "tests/tests/impostor_pictures/edge_cases.rs::hard_places_give_finite_pictures",

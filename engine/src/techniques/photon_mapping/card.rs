@@ -269,7 +269,7 @@ mod tests {
             ("ray", 2.0 / 3.0, 1.0 / 3.0),
             ("beams", 0.8, 0.4),
             ("planes", 0.8, 0.4),
-            ("unified", 0.8, 0.4),
+            ("unified", 2.0 / 3.0, 1.0 / 3.0),
         ] {
             let law = of(serde_json::json!({ "volume": volume, "reduction": reduction }));
             assert!((0.5 * law.slope - rate).abs() < 1e-6, "{volume}: {law:?}");

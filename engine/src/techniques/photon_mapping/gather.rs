@@ -109,8 +109,6 @@ pub(super) struct EventsAsked<'a> {
     pub radius: f64,
     /// Share of ways that have planes.
     pub plane_share: f64,
-    /// Radius of collisions over the mean free path of their medium, at most; 0 for any.
-    pub path_share: f64,
 }
 
 type Counters = photon_gather::GatherCounters;
@@ -232,7 +230,6 @@ impl Gather {
             scale: scale as f32,
             radius: events.radius as f32,
             plane_share: events.plane_share as f32,
-            path_share: events.path_share as f32,
         });
         GatherStage {
             beam,

@@ -160,7 +160,7 @@ impl PhotonMapper {
         }
         let has_media = scene.profile().media.any();
         if has_media && settings.volume.needs_homogeneous_media() && scene.profile().media.heterogeneous {
-            let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\" or \"march\"";
+            let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\", \"unified\" or \"march\"";
             return Err(Error::setting("volume", settings.volume.word(), cause));
         }
         let (classes, eye_paths) = (settings.classes()?, settings.eye_paths(has_media)?);
@@ -371,7 +371,6 @@ impl PhotonMapper {
                         map,
                         radius: event_kernel.length_max,
                         plane_share,
-                        path_share,
                     }),
                     watts,
                     nearest,

@@ -131,14 +131,14 @@ crate::settings! {
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
         /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or, in homogeneous
         /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there; or collisions and ways together, each
-        /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin.
+        /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin; in grids there are collisions alone.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
         /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.
         ///
         /// 0 stands for the radius of fixed kernels under which rays meet some tens of them, which a small picture of few photons finds out, at most a fiftieth of the scene's diagonal
-        /// and in each medium a quarter of its mean free path; and for a ninth of the diagonal for others. With planes, which are met with beams, the same share of all ways has one; with a radius of your own all have.
+        /// and in each medium a quarter of its mean free path, of ways in the densest one for all; and for a ninth of the diagonal for others. With planes, which are met with beams, the same share of all ways has one; with a radius of your own all have.
         pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
         /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
@@ -301,7 +301,7 @@ impl PhotonSettings {
         shrunk.powf(2.0 / self.volume.dimensions())
     }
 
-    /// Whether the ways of photons through media are stored, instead of their collisions.
+    /// Whether the ways of photons through media are stored, instead of their collisions or beside them.
     pub(super) fn stores_ways(&self) -> bool {
         self.volume.stores_ways()
     }

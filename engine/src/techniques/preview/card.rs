@@ -1,6 +1,5 @@
 //! The raster preview as a technique.
 
-use super::drawing::LIGHTS_MAX;
 use super::{PreviewMethod, PreviewSettings, fading, live, planar, probe, reflection};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
@@ -68,7 +67,6 @@ pub(in crate::techniques) const CARD: Card = Card {
 
 fn refusals(profile: &SceneProfile) -> Vec<String> {
     let placed = profile.lights.point + profile.lights.spot;
-    let lights = placed + profile.lights.directional;
     let emits = profile.has_area_lights() || profile.has_unlit;
     let all = [
         (
@@ -97,10 +95,6 @@ fn refusals(profile: &SceneProfile) -> Vec<String> {
                 "{} lights are directional, and there are shadow maps for {SHADOW_MAPS_MAX}",
                 profile.lights.directional
             ),
-        ),
-        (
-            lights > LIGHTS_MAX as usize,
-            format!("it has {lights} lights, of which {LIGHTS_MAX} are drawn"),
         ),
     ];
     all.into_iter()

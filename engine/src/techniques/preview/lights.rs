@@ -51,10 +51,10 @@ impl PreviewShadows {
             placed,
             suns,
         } = room;
-        for (name, count) in [("lights", placed), ("suns", suns)] {
+        for (which, count) in [("that have a place", placed), ("that are directional", suns)] {
             if count > SHADOW_MAPS_MAX {
-                let cause = format!("are more than the {SHADOW_MAPS_MAX} that may have shadow maps");
-                return Err(Error::setting(name, count, cause));
+                let cause = format!("{which} are more than the {SHADOW_MAPS_MAX} that may have shadow maps");
+                return Err(Error::setting("lights", count, cause));
             }
         }
         let iterations = room.iterations(self.width);

@@ -25,7 +25,8 @@ crate::settings! {
     pub struct PreviewSettings {
         /// How shadow maps store directions; changes the borders of shadows.
         pub shadow_layout: ShadowLayout = ShadowLayout::Octahedron;
-        /// Along a side of an octahedron, or of each face of a cube: more give less bias at borders of shadows.
+        /// Along a side of an octahedron, or of each face of a cube, and of the square across all of the scene that a directional light has: more give less bias at borders of
+        /// shadows.
         ///
         /// Shadows of what is no larger than texels are wrong as a whole: in `builtin:conference` at more than a tenth of the places that face
         /// the light with the default, and at 9 % with 2508.
@@ -73,8 +74,8 @@ pub struct PreviewMethod {
     coverage: Coverage,
     /// Shadow maps whose parts have been counted.
     measured: Vec<LightMap>,
-    /// Parts of what frames share.
-    shadow_parts: Vec<(LightMap, DrawPart)>,
+    /// Parts of what frames share: which of the maps, and what of it.
+    shadow_parts: Vec<(usize, DrawPart)>,
     /// Parts of a frame that draw; further ones shade.
     draw_parts: Vec<DrawPart>,
 }
@@ -127,9 +128,10 @@ impl FrameMethod for PreviewMethod {
             self.shadow_parts.clear();
         }
         // A map each time: hosts look at the time between two.
-        if let Some(map) = maps.get(self.measured.len()) {
+        let next = self.measured.len();
+        if let Some(map) = maps.get(next) {
             let parts = self.drawing.lights.parts_of_map(&self.coverage, &surfaces, map)?;
-            self.shadow_parts.extend(parts.into_iter().map(|part| (*map, part)));
+            self.shadow_parts.extend(parts.into_iter().map(|part| (next, part)));
             self.measured.push(*map);
         }
         let is_whole = self.measured.len() == maps.len();
@@ -142,7 +144,10 @@ impl FrameMethod for PreviewMethod {
             self.lights_drawn += lights.len() as u64;
             self.drawing.lights.record_lights(recorder, &surfaces, &lights)?;
         }
-        match self.shadow_parts.get(part.number as usize) {
+        // As the lights are now: a map may be along other axes than when it was measured.
+        let maps = self.drawing.lights.maps(&lights);
+        let of_part = self.shadow_parts.get(part.number as usize);
+        match of_part.and_then(|(map, part)| Some((maps.get(*map)?, part))) {
             Some((map, part)) => self.drawing.lights.record_map(recorder, &surfaces, map, part),
             None => Ok(()),
         }

@@ -52,8 +52,6 @@ pub(in crate::techniques::photon_mapping) struct BeamStage<'a> {
     pub radius: f32,
     /// Share of ways that have planes.
     pub plane_share: f32,
-    /// Radius of collisions over the mean free path of their medium, at most; 0 for any.
-    pub path_share: f32,
 }
 
 /// Which eye paths ask, and for what.
@@ -190,7 +188,6 @@ impl BeamStage<'_> {
             most_bounces: self.beam.bounces[1],
             scale: self.scale,
             radius: self.radius,
-            path_share: self.path_share,
             plane_weight: 1.0 / self.plane_share,
             classes: self.beam.classes,
             ..Default::default()

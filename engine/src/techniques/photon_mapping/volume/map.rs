@@ -17,7 +17,9 @@ use crate::accel::photon_map::complete_bvh::CompleteBvh;
 use crate::accel::photon_map::device::{MapBuffers, MapBuilder};
 use crate::accel::photon_map::merge::merged_hierarchy;
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{COMPACT_NOTHING, EVENT_LEAF_END, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE, POINT_RECORD};
+use crate::gpu::shaders::constants::{
+    COMPACT_NOTHING, EVENT_LEAF_END, LBVH_BOXES_PER_INVOCATION, LBVH_GROUP_SIZE, POINT_RECORD,
+};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_event_boxes, photon_event_leaves};
 use crate::gpu::shaders::types::CompactRoot;
 use crate::gpu::{Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Submission, TexelView};

@@ -4,7 +4,7 @@
 //! W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate for Volumetric Photon Mapping", Computer Graphics Forum 27(2), 2008; B. Fabianowski,
 //! "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, chapter 7; C. Knaus and M. Zwicker, "Progressive Photon Mapping: A
 //! Probabilistic Approach", ACM TOG 30(3), 2011; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light
-//! Transport", ACM TOG 36(4), 2017.
+//! Transport", ACM TOG 36(4), 2017; J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014.
 //!
 //! Nothing of it is made for scenes without media. Bias: kernels blur, and lose the light of media by walls and boundaries as far as they reach, since there are
 //! no events beyond; a thin wall lets them through. Both fade as kernels shrink. Planes have none: what they carry is unbiased, the rest comes by beams.
@@ -47,8 +47,9 @@ impl VolumeEstimate {
     pub(super) fn dimensions(self) -> f64 {
         match self {
             // What planes leave is seen by beams.
-            Self::Beams | Self::Planes | Self::Unified => 1.0,
-            Self::Ray => 2.0,
+            Self::Beams | Self::Planes => 1.0,
+            // In grids collisions stand alone.
+            Self::Ray | Self::Unified => 2.0,
             Self::March => 3.0,
         }
     }

@@ -11,8 +11,8 @@ use super::event::{PhotonBeam, pack_beam, unpack_beam};
 use crate::gpu::shaders::constants::WIDE_QUARTERS;
 use glam::{DVec3, Vec3};
 
-/// Words of a record of a map that has planes, beams among them: 48 bytes.
-pub type PlaneWords = [[u32; 4]; WIDE_QUARTERS as usize];
+/// Words of a record of a map that has planes, or collisions, beside beams: 48 bytes.
+pub type WideWords = [[u32; 4]; WIDE_QUARTERS as usize];
 
 /// Two flights of a photon.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +32,7 @@ pub struct PhotonPlane {
 }
 
 /// The words of a plane.
-pub fn pack_plane(p: &PhotonPlane) -> PlaneWords {
+pub fn pack_plane(p: &PhotonPlane) -> WideWords {
     let [q0, q1] = pack_beam(&PhotonBeam {
         start: p.start,
         end: p.start + p.first,
@@ -45,7 +45,7 @@ pub fn pack_plane(p: &PhotonPlane) -> PlaneWords {
 }
 
 /// The plane of these words.
-pub fn unpack_plane(words: &PlaneWords) -> PhotonPlane {
+pub fn unpack_plane(words: &WideWords) -> PhotonPlane {
     let [q0, q1, [x, y, z, _]] = *words;
     let beam = unpack_beam(&[q0, q1]);
     PhotonPlane {
@@ -59,7 +59,7 @@ pub fn unpack_plane(words: &PlaneWords) -> PhotonPlane {
 }
 
 /// Whether the words are those of a plane, rather than of a beam in a map that has both.
-pub fn is_plane(words: &PlaneWords) -> bool {
+pub fn is_plane(words: &WideWords) -> bool {
     unpack_plane(words).second != Vec3::ZERO
 }
 

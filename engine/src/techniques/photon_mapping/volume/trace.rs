@@ -6,7 +6,7 @@
 use super::VolumeEstimate;
 use super::event::{EventWords, MEDIUM_WORD};
 use super::footprint::EventKernelSettings;
-use super::plane::PlaneWords;
+use super::plane::WideWords;
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, NO_MEDIUM};
@@ -25,7 +25,7 @@ const EVENTS_PER_PHOTON: u64 = 4;
 /// Pieces that a way is stored in, at most: long ones have wide boxes. Fewer where a device cannot hold as many.
 const WAY_PIECES: u32 = 32;
 
-const _: () = assert!(MEDIUM_WORD < 4 && size_of::<EventWords>() <= 32 && size_of::<PlaneWords>() <= 48);
+const _: () = assert!(MEDIUM_WORD < 4 && size_of::<EventWords>() <= 32 && size_of::<WideWords>() <= 48);
 
 /// What the stages are told beside the wave.
 #[derive(Debug, Clone, Copy)]
@@ -88,6 +88,8 @@ pub(in crate::techniques::photon_mapping) struct VolumeTrace {
     events: TexelView,
     capacity: u32,
     pieces_most: u32,
+    /// Ways are stored, and there are media that they are stored in.
+    has_pieces: bool,
     slots: u32,
 }
 
@@ -100,7 +102,7 @@ impl VolumeTrace {
         let estimate = options.estimate;
         let (stores_ways, stores_planes) = (estimate.stores_ways(), estimate.stores_planes());
         let stores_points = estimate.stores_points();
-        let quarters = options.estimate.quarters();
+        let quarters = estimate.quarters();
         let profile = scene.profile();
         let media = profile.media.count as u64;
         if media > u64::from(EVENT_MEDIUM_MASK) {
@@ -143,7 +145,7 @@ impl VolumeTrace {
             })?,
             beside: estimate
                 .stores_beside()
-                .then(|| work("photons beside ways", u64::from(slots) * size_of::<PlaneWords>() as u64))
+                .then(|| work("photons beside ways", u64::from(slots) * size_of::<WideWords>() as u64))
                 .transpose()?,
             ways: if stores_ways {
                 let bytes = u64::from(slots) * size_of::<types::PhotonWay>() as u64;
@@ -169,6 +171,7 @@ impl VolumeTrace {
             quarters,
             capacity,
             pieces_most: WAY_PIECES,
+            has_pieces: stores_ways && profile.media.homogeneous,
             slots,
             scan,
         })
@@ -319,7 +322,7 @@ impl VolumeTrace {
     pub fn grow(&mut self, gpu: &Gpu, needed: u32) -> Result<()> {
         let most = events_of_device(gpu, self.quarters);
         let mut needed = needed;
-        if u64::from(needed) > most && self.ways.is_some() && self.pieces_most > 1 {
+        if u64::from(needed) > most && self.has_pieces && self.pieces_most > 1 {
             self.pieces_most /= 2;
             needed = most as u32;
         }
