@@ -36,7 +36,7 @@ fn unified_estimates_agree_with_the_path_tracer() {
             // As of beams in one box (`volume.rs`).
             let unified = with(VolumeEstimate::Unified, "bounces=2..4", 1 << 12);
             let counts = expect_agreement(gpu, &scene, &unified, [16, 1024], [1.5e-2; 3]);
-            assert!(counts.beams.photons > 1000);
+            assert!(counts.beams.photons > 300);
         }
     });
 }
@@ -71,7 +71,7 @@ fn errors_are_near_to_those_of_the_better_estimate() {
         for (scene, set) in [
             (thin, "bounces=2..3"),
             (lit_box(medium(25.0, 0.9, Phase::Isotropic)), "bounces=2..3"),
-            (builtin("builtin:fog-box?sphere=glass"), "L.*VE"),
+            (builtin("builtin:fog-box?boxes=none"), "L.*VE"),
         ] {
             let truth = traced(gpu, &scene, set, 2048);
             let [points, beams, unified] =

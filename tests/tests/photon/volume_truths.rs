@@ -55,6 +55,10 @@ fn slabs_have_the_radiance_of_the_tables() {
         {
             scene.cameras = vec![parallel(DVec3::new(0.0, height, 0.0), forward, 2.0)];
             for volume in ESTIMATES {
+                if volume == VolumeEstimate::Planes {
+                    // The beam and the rays have one direction, along which planes that begin by it have no width.
+                    continue;
+                }
                 // Light is even across the rays, along which disks and beams have no width. Balls have one, and lack events beyond the faces.
                 let (volume_radius, bias) = match volume {
                     VolumeEstimate::March => (0.08, 2.5e-2),
@@ -80,6 +84,10 @@ fn rays_past_a_source_have_the_exact_multiple_scattering() {
             let mut scene = endless(medium(1.0, albedo, Phase::Isotropic));
             scene.cameras = vec![parallel(DVec3::new(-3.0, h, 0.0), DVec3::X, 1e-6)];
             for volume in ESTIMATES {
+                if volume == VolumeEstimate::Planes {
+                    // Without blur: `planes.rs`.
+                    continue;
+                }
                 let settings = PhotonSettings {
                     volume,
                     volume_radius: 0.15,
@@ -153,7 +161,7 @@ fn furnaces_stay_even_with_lossless_media_inside() {
                     photons: 1 << 11,
                     ..settings("all")
                 };
-                let found = means(gpu, &room, &settings, 8);
+                let found = means(gpu, &room, &settings, 6);
                 for channel in 0..3 {
                     found.expect(&format!("{what}, {volume:?}"), 0, channel, exactly(2.0), bias);
                 }

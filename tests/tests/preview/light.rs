@@ -255,9 +255,8 @@ fn direct_light_is_the_path_tracers() {
             irradiance: intensity,
         };
         let suns = [sun(direction), sun(Vec3::new(-0.7, -1.0, 0.4))];
-        // Each by itself; and together, each by the map of its own.
-        for lights in [&[point][..], &[spot], &suns[..1], &[suns[0], point, suns[1], spot]] {
-            let scene = lit_block(lights);
+        for lights in [[point], [spot], [suns[0]], [suns[1]]] {
+            let scene = lit_block(&lights);
             let traced = render(gpu, &scene, SIZE, 64, &paths("direct"));
             for layout in ShadowLayout::ALL {
                 let shadows = PreviewShadows {
@@ -280,6 +279,24 @@ fn direct_light_is_the_path_tracers() {
                 assert!(median < 0.01, "{lights:?}, {}: {median}", layout.name());
                 assert!(high < 0.25, "{lights:?}, {}: {high}", layout.name());
             }
+        }
+        // Together each has the map of its own.
+        let layout = ShadowLayout::Octahedron;
+        let shadows = PreviewShadows {
+            layout,
+            side: 256,
+            width: 1,
+            suns: 2,
+        };
+        let shown = |lights: &[LightKind]| pixels(&picture(gpu, &lit_block(lights), 1, Some(shadows)));
+        let all = [suns[0], point, suns[1], spot];
+        let each = all.map(|light| shown(&[light]));
+        for (i, found) in shown(&all).into_iter().enumerate() {
+            let sum: DVec3 = each.iter().map(|picture| picture[i]).sum();
+            assert!(
+                (found - sum).abs().max_element() <= 1e-5 * (1.0 + sum.max_element()),
+                "{i}: {found} {sum}"
+            );
         }
     });
 }

@@ -695,7 +695,9 @@ fn planes_agree_with_their_twins() {
             assert_eq!(result.bits(2), u32::from(is_plane(&words)));
             let back = unpack_plane(&words);
             assert_eq!([result.bits(3), result.bits(4)], [back.medium, back.bounce]);
-            assert_eq!(Vec3::from_slice(&result.0[5..]), back.first);
+            // The end of the first flight was rounded.
+            let off = Vec3::from_slice(&result.0[5..]) - back.first;
+            assert!(f64::from(off.abs().max_element()) <= 16.0 * U, "{off}");
             let extinctions = [least_extinction(v3(&x, 20)), plane_extinction(v3(&x, 23), v3(&x, 20))];
             for (found, expected) in result.0[12..].iter().zip(extinctions) {
                 assert!(

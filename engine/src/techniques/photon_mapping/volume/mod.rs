@@ -218,7 +218,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-PHOTON-PLANES",
         name: "photon planes: two flights in a row through a medium, seen where a ray meets what they span, without kernels",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Homogeneous media alone, and only light scattered there twice at last with nothing in between, the rest by beams; short flights; a ray nearly in a plane is noise without bound, by which the variance grows with the logarithm of the number of planes; one ray along a flight stands for all planes of an eye path's way.",
+        limits: "Homogeneous media alone, and only light scattered there twice at last with nothing in between, the rest by beams; short flights; a ray nearly in a plane is noise without bound, by which the variance grows with the logarithm of the number of planes; parallel light along parallel rays is missing; one ray along a flight stands for all planes of an eye path's way.",
         sources: &[sources::BITTERLI_JAROSZ_2017.whole()],
         bias: Some(Bias::Unbiased),
         shaders: &[
