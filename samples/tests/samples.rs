@@ -585,7 +585,11 @@ fn the_lamp_in_the_fog_goes_around_and_keys_change_the_estimate() {
     for expected in ["ray, ", "kernels a ray", "medians of 2 frames", "photons/s"] {
         assert!(text.contains(expected), "no {expected:?} in {text}");
     }
-    for (volume, keys, expected) in [("march", "ee", "beams, "), ("beams", "E", "planes, ")] {
+    for (volume, keys, expected) in [
+        ("march", "ee", "unified, "),
+        ("unified", "e", "beams, "),
+        ("beams", "E", "planes, "),
+    ] {
         let (_, text) = shown(&["--volume", volume, "--keys", keys, "--frames", "2"]);
         assert!(text.contains(expected), "{text}");
     }

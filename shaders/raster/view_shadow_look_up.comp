@@ -10,11 +10,11 @@ layout(local_size_x = 64) in;
 #include "raster/view_shadow.glsl"
 
 layout(push_constant, scalar) uniform Push {
-    ShadowView view;
     uint count;
     uint map;
     int side;
     int width;  // texels; 0 takes the nearest texel alone
+    ShadowView view;
 } push;
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { ShadowQuery queries[]; };

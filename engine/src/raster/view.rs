@@ -9,7 +9,7 @@
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::Surfaces;
-use crate::accel::Ray;
+use crate::accel::{MAX_COORDINATE, Ray};
 use crate::gpu::Area;
 use crate::gpu::shaders::types::RasterView;
 use crate::maps::cube::{CUBE_FACES, cube_axes};
@@ -30,6 +30,14 @@ pub struct View {
     pub(super) record: RasterView,
     /// Of views of octants.
     pub(super) layout: Option<OctahedronLayout>,
+}
+
+/// The sphere about what rays can meet within bounds, of a radius above 0, metres.
+fn sphere_about(bounds: [Vec3; 2]) -> (DVec3, f64) {
+    let limit = Vec3::splat(MAX_COORDINATE);
+    let [lower, upper] = bounds.map(|corner| corner.clamp(-limit, limit).as_dvec3());
+    let radius = 0.5 * (upper - lower).length();
+    (0.5 * (lower + upper), if radius > 0.0 { radius } else { 1.0 })
 }
 
 impl View {
@@ -111,14 +119,11 @@ impl View {
     /// # Errors
     /// [`Error::Setting`] for bounds that are not finite.
     pub fn of_beam(direction: Vec3, surfaces: &Surfaces<'_>, area: Area) -> Result<Self> {
-        let [lower, upper] = surfaces.bounds;
-        let radius = 0.5 * (upper - lower).length();
-        // Behind all of the scene, if there is any.
-        let radius = if radius > 0.0 { radius } else { 1.0 };
-        let origin = 0.5 * (lower + upper) - radius * direction;
+        let (middle, radius) = sphere_about(surfaces.bounds);
         let forward = direction.as_dvec3();
+        let origin = (middle - radius * forward).as_vec3();
         let (right, down) = forward.any_orthonormal_pair();
-        let half_side = f64::from(radius);
+        let half_side = radius;
         let view = Self::central(origin, [right / half_side, down / half_side, forward], 0.0, area)?;
         Ok(view.into_parallel(forward, 4.0 * half_side))
     }
@@ -129,15 +134,13 @@ impl View {
     ///
     /// # Errors
     /// As [`View::of_beam`].
-    pub(crate) fn of_shifted_beam(direction: Vec3, [lower, upper]: [Vec3; 2], side: u32, shift: DVec2) -> Result<Self> {
-        let radius = 0.5 * f64::from((upper - lower).length());
-        let radius = if radius > 0.0 { radius } else { 1.0 };
+    pub(crate) fn of_shifted_beam(direction: Vec3, bounds: [Vec3; 2], side: u32, shift: DVec2) -> Result<Self> {
+        let (middle, radius) = sphere_about(bounds);
         // Half of the pixels are as wide as the radius and one pixel more.
         let pixel = 2.0 * radius / f64::from(side.saturating_sub(2).max(1));
         let half_side = 0.5 * f64::from(side) * pixel;
         let forward = direction.as_dvec3().normalize();
         let (right, down) = forward.any_orthonormal_pair();
-        let middle = 0.5 * (lower.as_dvec3() + upper.as_dvec3());
         let across = shift.x * pixel * right + shift.y * pixel * down;
         let origin = (middle + across - (radius + pixel) * forward).as_vec3();
         let rows = [right / half_side, down / half_side, forward];

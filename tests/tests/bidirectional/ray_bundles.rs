@@ -165,6 +165,27 @@ fn check_lists(gpu: &Gpu, what: &str, lists: &BundleLists, triangles: &[[Vec3; 3
     }
 }
 
+/// A floor, and above it a triangle whose corners are one.
+fn floor_and_point() -> Scene {
+    let mut scene = Scene {
+        name: "floor and point".into(),
+        ..Scene::default()
+    };
+    let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
+    scene.place(floor("floor", white, 1.0, 0.0));
+    scene.place(Mesh {
+        positions: vec![Vec3::Y; 3],
+        triangles: vec![[0, 1, 2]],
+        material: Some(white),
+        ..Mesh::default()
+    });
+    scene
+        .cameras
+        .push(orthographic(DVec3::Y * 1.9, DVec3::ZERO, -DVec3::Z, 1.0));
+    add_point(&mut scene, Vec3::new(0.5, 1.7, 0.2), 2.0);
+    scene
+}
+
 #[test]
 fn lists_are_what_rays_meet_in_order() {
     with_gpu(|gpu| {
@@ -172,6 +193,7 @@ fn lists_are_what_rays_meet_in_order() {
             builtin("builtin:cornell-box"),
             room_with_point(),
             builtin("builtin:triangle-soup?n=300"),
+            floor_and_point(),
         ] {
             let mut renderer = bundles(gpu, &scene, &of("bounces=3,lobes=diffuse", 64));
             assert!(renderer.lists().expect("lists").is_none());

@@ -125,7 +125,8 @@ fn row(
             beyond += u64::from(off.abs() > texel);
         }
     }
-    let steps = 2 * WIDTH as i32 * STEPS;
+    // The filter and a texel, so that coarse maps do not come to the shadow's other border.
+    let steps = (WIDTH.div_ceil(2) + 1) as i32 * STEPS;
     let across: Vec<ShadowPlace> = (-steps..steps)
         .map(|step| on_floor(half + (step as f32 + 0.5) / STEPS as f32 * texel, 0.1))
         .collect();
