@@ -163,7 +163,7 @@ impl Study for Found {
     }
 
     fn findings(&self) -> Findings {
-        let finest = self.iter().filter(|row| row.light == "spot").next_back();
+        let finest = self.iter().rfind(|row| row.light == "spot");
         Findings::of(self, OF_ROWS)
             .headline(
                 "share of wrong places about the shadow of a square, under a spot with the finest map (%)",
