@@ -42,6 +42,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     // Vectors of three numbers without a gap behind them.
     ("accel/lbvh_retry.comp", "MemberOffset"),
     ("film/add_frame.comp", "ArrayStride"),
+    ("raster/view_shadow_look_up.comp", "ArrayStride"),
     ("host_frame.comp", "ArrayStride"),
     // A reference that naga does not follow.
     ("cube_probe.comp", "InvalidId"),
