@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::host::{DeviceFeatures, EnabledFeatures};
 use super::options::Lesser;
+use crate::{Error, Result};
 
 /// Iterations of all loops of an invocation together after which software drivers end loops silently; the test that ends a loop counts
 /// too.
@@ -211,6 +212,20 @@ fn indexable_texels(offered: u32) -> u64 {
 }
 
 impl Caps {
+    /// Fails for more bytes than a storage buffer may have.
+    pub(crate) fn check_storage(&self, name: &'static str, bytes: u64) -> Result<()> {
+        let limit = self.max_storage_buffer_range;
+        if bytes <= limit {
+            return Ok(());
+        }
+        Err(Error::LimitExceeded {
+            name: name.into(),
+            value: bytes,
+            limit_name: "maxStorageBufferRange",
+            limit,
+        })
+    }
+
     /// Lowers what was read to what a test pretends.
     pub(super) fn pretend(&mut self, lesser: &Lesser) {
         if let Some(descriptors) = lesser.descriptors {

@@ -136,15 +136,7 @@ impl OmniShadowDesc {
         let bytes = (self.texels())
             .saturating_mul(u64::from(self.maps))
             .saturating_mul(size_of::<f32>() as u64);
-        let limit = gpu.caps().max_storage_buffer_range;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "shadow maps".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        gpu.caps().check_storage("shadow maps", bytes)?;
         Ok(bytes)
     }
 }
@@ -182,6 +174,17 @@ pub struct ShadowPlace {
     pub normal: Vec3,
     /// How far the position may be off its surface, metres: `|normal|·error` of a [`SurfacePoint`](crate::accel::offset::SurfacePoint).
     pub slack: f32,
+}
+
+impl ShadowPlace {
+    /// What kernels that look up are asked.
+    pub(super) fn query(&self) -> ShadowQuery {
+        ShadowQuery {
+            position: self.position.to_array(),
+            slack: self.slack,
+            normal: self.normal.to_array(),
+        }
+    }
 }
 
 /// Shadow maps of point lights, all of one layout and size, in one buffer.
@@ -344,14 +347,7 @@ impl OmniShadowMaps {
             shadow_kind: self.desc.layout.kind(),
             shadow_width: width as i32,
         })?;
-        let queries: Vec<_> = places
-            .iter()
-            .map(|place| ShadowQuery {
-                position: place.position.to_array(),
-                slack: place.slack,
-                normal: place.normal.to_array(),
-            })
-            .collect();
+        let queries: Vec<ShadowQuery> = places.iter().map(ShadowPlace::query).collect();
         let queries = self.gpu.buffer_with("shadow queries", Category::Work, &queries)?;
         let bytes = size_of::<f32>() as u64 * places.len() as u64;
         let shares = self

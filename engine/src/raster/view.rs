@@ -122,10 +122,7 @@ impl View {
         let (middle, radius) = sphere_about(surfaces.bounds);
         let forward = direction.as_dvec3();
         let origin = (middle - radius * forward).as_vec3();
-        let (right, down) = forward.any_orthonormal_pair();
-        let half_side = radius;
-        let view = Self::central(origin, [right / half_side, down / half_side, forward], 0.0, area)?;
-        Ok(view.into_parallel(forward, 4.0 * half_side))
+        Self::parallel_square(origin, forward, radius, area)
     }
 
     /// What parallel rays along a direction meet of surfaces within bounds, in a target of `side` pixels a side: as [`View::of_beam`], in a square that is a pixel wider on each side, all pixels moved by a
@@ -143,9 +140,14 @@ impl View {
         let (right, down) = forward.any_orthonormal_pair();
         let across = shift.x * pixel * right + shift.y * pixel * down;
         let origin = (middle + across - (radius + pixel) * forward).as_vec3();
+        Self::parallel_square(origin, forward, half_side, Area::whole([side; 2]))
+    }
+
+    /// Parallel rays of a unit direction, in a square about an origin, up to twice its width.
+    fn parallel_square(origin: Vec3, forward: DVec3, half_side: f64, area: Area) -> Result<Self> {
+        let (right, down) = forward.any_orthonormal_pair();
         let rows = [right / half_side, down / half_side, forward];
-        let view = Self::central(origin, rows, 0.0, Area::whole([side; 2]))?;
-        Ok(view.into_parallel(forward, 4.0 * half_side))
+        Ok(Self::central(origin, rows, 0.0, area)?.into_parallel(forward, 4.0 * half_side))
     }
 
     /// The same with parallel rays along its axis, up to a distance.

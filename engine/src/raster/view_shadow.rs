@@ -57,15 +57,7 @@ impl ViewShadowDesc {
         let bytes = (self.texels())
             .saturating_mul(u64::from(self.maps))
             .saturating_mul(size_of::<f32>() as u64);
-        let limit = gpu.caps().max_storage_buffer_range;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "shadow maps of views".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        gpu.caps().check_storage("shadow maps of views", bytes)?;
         Ok(bytes)
     }
 }
@@ -249,14 +241,7 @@ impl ViewShadowMaps {
             return Ok(Vec::new());
         }
         let pipeline = self.gpu.compute_pipeline::<kernel::Kernel>(&())?;
-        let queries: Vec<_> = places
-            .iter()
-            .map(|place| ShadowQuery {
-                position: place.position.to_array(),
-                slack: place.slack,
-                normal: place.normal.to_array(),
-            })
-            .collect();
+        let queries: Vec<ShadowQuery> = places.iter().map(ShadowPlace::query).collect();
         let queries = self.gpu.buffer_with("shadow queries", Category::Work, &queries)?;
         let bytes = size_of::<f32>() as u64 * places.len() as u64;
         let desc = BufferDesc::storage("shadow shares", bytes, Category::Work);

@@ -1,10 +1,10 @@
 //! What an automatic choice ([`plan`](mod@crate::plan)) must know of a technique beside what its pilot pictures show.
 
+use crate::Result;
 use crate::gpu::Caps;
 use crate::scene::{Light, SceneProfile};
 use crate::settings::Settings;
 use crate::transport::PathSet;
-use crate::{Error, Result};
 
 use super::FrameTarget;
 
@@ -68,14 +68,5 @@ impl Foresight {
 
 /// Refuses frames that are larger than a storage buffer.
 pub(super) fn frame_fits(caps: &Caps, size: [u32; 2]) -> Result<()> {
-    let (value, limit) = (FrameTarget::bytes(size), caps.max_storage_buffer_range);
-    if value > limit {
-        return Err(Error::LimitExceeded {
-            name: "frame".into(),
-            value,
-            limit_name: "maxStorageBufferRange",
-            limit,
-        });
-    }
-    Ok(())
+    caps.check_storage("frame", FrameTarget::bytes(size))
 }

@@ -36,6 +36,7 @@ layout(constant_id = 47) const bool MARCHES = false;
 layout(constant_id = 55) const bool BEAMS = false;   // the map holds ways of photons
 layout(constant_id = 56) const bool PLANES = false;  // and planes
 layout(constant_id = 57) const bool POINTS = false;  // and collisions
+const bool WIDE = PLANES || POINTS;
 
 layout(set = 1, binding = 0) uniform utextureBuffer event_pairs;
 layout(set = 1, binding = 1) uniform utextureBuffer event_records;
@@ -50,7 +51,7 @@ layout(set = 1, binding = 6, scalar) restrict buffer PhotonPlaneRays { PlaneRay 
 
 uvec4 compact_quarter(uint index) { return texelFetch(event_pairs, int(index)); }
 uvec4 event_quarter(uint record, uint quarter) {
-    return texelFetch(event_records, int((PLANES || POINTS ? WIDE_QUARTERS : EVENT_QUARTERS) * record + quarter));
+    return texelFetch(event_records, int((WIDE ? WIDE_QUARTERS : EVENT_QUARTERS) * record + quarter));
 }
 bool compact_visit_beam(uint record);
 
@@ -207,16 +208,13 @@ void add_plane(uint record, PhotonPlane p) {
 bool compact_visit_beam(uint record) {
     uvec4 q0 = event_quarter(record, 0u);
     uvec4 q1 = event_quarter(record, 1u);
-    if (PLANES) {
-        uvec4 q2 = event_quarter(record, 2u);
-        if (is_plane(q2)) {
-            add_plane(record, unpack_plane(q0, q1, q2));
-            return !event_ends_leaf(q0);
-        }
-    }
     uvec4 q2 = uvec4(0u);
-    if (POINTS) {
+    if (WIDE) {
         q2 = event_quarter(record, 2u);
+    }
+    if (PLANES && is_plane(q2)) {
+        add_plane(record, unpack_plane(q0, q1, q2));
+        return !event_ends_leaf(q0);
     }
     if (BEAMS && !(POINTS && is_point(q2))) {
         add_beam(q0, q1, q2);

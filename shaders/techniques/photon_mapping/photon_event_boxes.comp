@@ -16,6 +16,7 @@ layout(set = 0, binding = 2, scalar) restrict buffer LbvhStateBlock { LbvhState 
 layout(constant_id = 0) const bool BEAMS = false;  // records are pieces of ways
 layout(constant_id = 1) const bool PLANES = false;  // or planes, too
 layout(constant_id = 2) const bool POINTS = false;  // or collisions
+const bool WIDE = PLANES || POINTS;
 
 layout(push_constant, scalar) uniform PhotonEventBoxesPush {
     uint count;
@@ -54,19 +55,20 @@ void main() {
     uint place = gl_WorkGroupID.x * LBVH_GROUP_SIZE * LBVH_BOXES_PER_INVOCATION + lane;
     LbvhBox centres = LbvhBox(ivec3(0x7FFFFFFF), ivec3(int(0x80000000u)));
     for (uint i = 0u; i < LBVH_BOXES_PER_INVOCATION && place < event_push.count; ++i) {
-        uint quarter = (PLANES || POINTS ? WIDE_QUARTERS : EVENT_QUARTERS) * place;
+        uint quarter = (WIDE ? WIDE_QUARTERS : EVENT_QUARTERS) * place;
         vec3 from = uintBitsToFloat(texelFetch(event_records_in, int(quarter)).xyz);
         uvec4 q1 = texelFetch(event_records_in, int(quarter + 1u));
         vec3 to = BEAMS ? uintBitsToFloat(q1.xyz) : from;
         float radius = BEAMS ? event_push.radius : uintBitsToFloat(q1.y);
-        if (PLANES) {
-            uvec4 q2 = texelFetch(event_records_in, int(quarter + 2u));
-            if (is_plane(q2)) {
-                plane_corners(uintBitsToFloat(q2.xyz), from, to);
-                radius = 0.0;
-            }
+        uvec4 q2 = uvec4(0u);
+        if (WIDE) {
+            q2 = texelFetch(event_records_in, int(quarter + 2u));
         }
-        if (POINTS && is_point(texelFetch(event_records_in, int(quarter + 2u)))) {
+        if (PLANES && is_plane(q2)) {
+            plane_corners(uintBitsToFloat(q2.xyz), from, to);
+            radius = 0.0;
+        }
+        if (POINTS && is_point(q2)) {
             to = from;
             radius = uintBitsToFloat(q1.y);
         }

@@ -99,6 +99,14 @@ uint state_after(uint state) {
 // Distance of a flight through a homogeneous medium; the probability to come farther is a transmittance.
 float flight(float extinction, uint bits) { return -log(1.0 - unit_float(bits)) / extinction; }
 
+// Stores a record beside the way of a place.
+uint store_beside(uint place, uvec4 q0, uvec4 q1, uvec4 q2) {
+    photon_beside[WIDE_QUARTERS * place] = q0;
+    photon_beside[WIDE_QUARTERS * place + 1u] = q1;
+    photon_beside[WIDE_QUARTERS * place + 2u] = q2;
+    return FLAG_WAITING | FLAG_BESIDE;
+}
+
 // Stores the photon's flight along its way, `reach` long, and one into a direction that it may be scattered in, however far the photon itself comes. Both end by chance, as
 // in the band that comes farthest: what other bands have less of is a query's. In a body the second one has an end, beyond which nothing of the body lies.
 uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach, bool in_body) {
@@ -129,10 +137,7 @@ uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMe
         return 0u;
     }
     atomicAdd(photon_medium_counters.events, 1u);
-    photon_beside[WIDE_QUARTERS * place] = q0;
-    photon_beside[WIDE_QUARTERS * place + 1u] = q1;
-    photon_beside[WIDE_QUARTERS * place + 2u] = q2;
-    return FLAG_WAITING | FLAG_BESIDE;
+    return store_beside(place, q0, q1, q2);
 }
 
 // Stores a collision at `at`, after which the photon has the flux that is scattered, with the flight that it ends where ways are stored, too.
@@ -145,10 +150,7 @@ uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, floa
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
     pack_event(PhotonEvent(at, photon.direction, flux, radius, medium, history), q0, q1);
     if (STORES_POINTS) {
-        photon_beside[WIDE_QUARTERS * place] = q0;
-        photon_beside[WIDE_QUARTERS * place + 1u] = q1;
-        photon_beside[WIDE_QUARTERS * place + 2u] = pack_flight(flight, POINT_RECORD);
-        return FLAG_WAITING | FLAG_BESIDE;
+        return store_beside(place, q0, q1, pack_flight(flight, POINT_RECORD));
     }
     store_waiting(place, q0, q1, uvec4(0u));
     return FLAG_WAITING | FLAG_VOLUME;

@@ -1,6 +1,6 @@
 //! Photon planes: closed forms, the path tracer on the light paths that they alone carry, and what they share with beams.
 
-use super::volume::{airlight, endless, lit_box, single};
+use super::volume::{airlight, coloured, endless, lit_box, single};
 use super::volume_truths::{exactly, parallel};
 use super::*;
 use clerestory::scene::{AlphaMode, Medium, Phase};
@@ -43,18 +43,8 @@ fn planes_have_the_exact_multiple_scattering() {
 #[test]
 fn planes_agree_with_the_path_tracer_without_blur() {
     with_gpu(|gpu| {
-        // Bands that come differently far.
-        let coloured = Medium {
-            sigma_s: Vec3::new(1.0, 2.0, 4.0),
-            sigma_a: Vec3::new(0.5, 0.2, 0.1),
-            phase: Phase::HenyeyGreenstein { g: 0.5 },
-            ..Medium::default()
-        };
         // The sphere stands between many of the places of two flights.
-        for scene in [
-            lit_box(coloured.clone()),
-            builtin("builtin:fog-box?sphere=glass&sigma_s=3"),
-        ] {
+        for scene in [lit_box(coloured()), builtin("builtin:fog-box?sphere=glass&sigma_s=3")] {
             expect_agreement(gpu, &scene, &planes(OF_PLANES, 1 << 11), [24, 512], [0.0; 3]);
         }
         // A share of all ways that the radius of beams says; and rays along flights that pass a sheet with holes.
@@ -70,7 +60,7 @@ fn planes_agree_with_the_path_tracer_without_blur() {
             Vec3::new(-0.2, -0.3, -0.3),
             Vec3::new(-0.19, 0.3, 0.3),
         ));
-        for scene in [lit_box(coloured), sheet] {
+        for scene in [lit_box(coloured()), sheet] {
             let shared = PhotonSettings {
                 volume_radius: 0.0,
                 ..planes(OF_PLANES, 1 << 11)

@@ -1,8 +1,8 @@
 //! Collisions and ways of photons weighted together: the path tracer's light where each alone is good and where it is not, and errors near to those of the better one.
 
-use super::volume::{airlight, lit_box, uneven};
+use super::volume::{airlight, coloured, lit_box, uneven};
 use super::*;
-use clerestory::scene::{Medium, Phase, Projection};
+use clerestory::scene::{Phase, Projection};
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
 use clerestory_tests::render::{builtin, medium};
 use clerestory_tests::with_gpu;
@@ -20,15 +20,9 @@ fn with(volume: VolumeEstimate, set: &str, photons: u32) -> PhotonSettings {
 #[test]
 fn unified_estimates_agree_with_the_path_tracer() {
     with_gpu(|gpu| {
-        // Bands that come differently far; in a grid collisions alone; thin and dense.
-        let coloured = Medium {
-            sigma_s: Vec3::new(1.0, 2.0, 4.0),
-            sigma_a: Vec3::new(0.5, 0.2, 0.1),
-            phase: Phase::HenyeyGreenstein { g: 0.5 },
-            ..Medium::default()
-        };
+        // In a grid collisions alone; thin and dense.
         for scene in [
-            lit_box(coloured),
+            lit_box(coloured()),
             lit_box(uneven(medium(4.0, 0.8, Phase::Isotropic))),
             lit_box(medium(0.3, 0.9, Phase::Isotropic)),
             lit_box(medium(12.0, 0.9, Phase::Isotropic)),

@@ -53,6 +53,16 @@ pub(super) fn lit_box(medium: Medium) -> Scene {
     scene
 }
 
+/// A medium whose bands come differently far.
+pub(super) fn coloured() -> Medium {
+    Medium {
+        sigma_s: Vec3::new(1.0, 2.0, 4.0),
+        sigma_a: Vec3::new(0.5, 0.2, 0.1),
+        phase: Phase::HenyeyGreenstein { g: 0.5 },
+        ..Medium::default()
+    }
+}
+
 /// A density that changes across the box, up to twice the mean.
 pub(super) fn uneven(mut medium: Medium) -> Medium {
     let density = |p: DVec3| (2.0 * p.x * (0.5 + 0.5 * (7.0 * p.y).sin()) + 0.3 * p.z) as f32;

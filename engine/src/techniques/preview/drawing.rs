@@ -12,7 +12,7 @@ use crate::transport::GpuScene;
 use crate::{Error, Result};
 
 /// Lights at most: their records go into the command buffer.
-pub(super) const LIGHTS_MAX: u32 = 1024;
+const LIGHTS_MAX: u32 = 1024;
 
 #[derive(Debug)]
 pub(super) struct Drawing {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::lists::Lists;
 use super::{RayBundleSettings, RayBundles};
+use crate::Result;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::Caps;
 use crate::gpu::interface::ShaderInfo;
@@ -17,7 +18,6 @@ use crate::techniques::foresight::frame_fits;
 use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
 use crate::transport::{PathSet, SURFACE_FEATURES};
-use crate::{Error, Result};
 
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Consistent(
@@ -58,16 +58,7 @@ pub(in crate::techniques) const CARD: Card = Card {
 fn fits(caps: &Caps, size: [u32; 2]) -> Result<()> {
     frame_fits(caps, size)?;
     let pixels = u64::from(size[0]) * u64::from(size[1]);
-    let (value, limit) = (pixels * size_of::<BundleVertex>() as u64, caps.max_storage_buffer_range);
-    if value > limit {
-        return Err(Error::LimitExceeded {
-            name: "bundle vertices".into(),
-            value,
-            limit_name: "maxStorageBufferRange",
-            limit,
-        });
-    }
-    Ok(())
+    caps.check_storage("bundle vertices", pixels * size_of::<BundleVertex>() as u64)
 }
 
 /// Frames are independent, and all pixels have the directions of one.

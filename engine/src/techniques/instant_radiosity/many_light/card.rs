@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Interleaving, ManyLight, ManyLightSettings, Placement, Visibility};
+use crate::Result;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::Caps;
 use crate::gpu::interface::ShaderInfo;
@@ -19,7 +20,6 @@ use crate::techniques::foresight::frame_fits;
 use crate::techniques::skipped::skipped;
 use crate::techniques::{Bias, Card, Foresight, Law, Skipped, Technique, Variant, reasons};
 use crate::transport::{PathSet, SURFACE_FEATURES};
-use crate::{Error, Result};
 /// The causes, as the module's documentation has them.
 const BIAS: Bias = Bias::Biased(
     "what the bound of the geometry term leaves out is not compensated; the filter averages the light of neighbouring pixels on a surface; \
@@ -76,16 +76,7 @@ pub(in crate::techniques) const CARD: Card = Card {
 fn fits(caps: &Caps, size: [u32; 2]) -> Result<()> {
     frame_fits(caps, size)?;
     let places = Interleaving::new(size, ManyLightSettings::default().interleave).places();
-    let (value, limit) = (places * size_of::<GatherState>() as u64, caps.max_storage_buffer_range);
-    if value > limit {
-        return Err(Error::LimitExceeded {
-            name: "split states".into(),
-            value,
-            limit_name: "maxStorageBufferRange",
-            limit,
-        });
-    }
-    Ok(())
+    caps.check_storage("split states", places * size_of::<GatherState>() as u64)
 }
 
 /// Frames are independent, and pixels of a tile have the lights of one; lights that are kept bring the same error in all of them.
