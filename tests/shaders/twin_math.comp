@@ -180,6 +180,7 @@ void main() {
         out_bits(4u, lights.x);
         out_bits(5u, lights.y);
         out_bits(6u, interleave_subset(lights.x, n * n, max(in_bits(7u), 1u)));
+        out_bits(7u, interleave_subset_of_tile(in_bits(6u), in_bits(8u), in_bits(9u)));
         break;
     }
     case 16u: {  // partial weights of paths from both ends

@@ -14,7 +14,7 @@ mod chosen;
 mod peer;
 mod race;
 mod report;
-mod spread;
+pub(crate) mod spread;
 mod summary;
 
 use std::path::{Path, PathBuf};

@@ -57,7 +57,7 @@ pub const QUANTILE: f64 = 0.999;
 pub struct CompareOptions {
     /// ε in (a − b)² / (b² + ε) over the square of the reference's mean radiance ([`relative_mse_epsilon`]); default [`RELATIVE_MSE_OFFSET`].
     pub relative_mse_offset: f64,
-    /// Tone map applied to both pictures before FLIP; default: exposure 0, clipped sRGB.
+    /// Tone map applied to both pictures before FLIP, by the reference's brightness where the curve depends on one; default: exposure 0, clipped sRGB.
     pub tone: ToneMap,
     /// Pixels per degree of visual angle for FLIP, in [`PIXELS_PER_DEGREE`]: 2 to 1000. Default 67, the authors' choice: a screen 0.7 m and 3840
     /// pixels wide seen from 0.7 m.
@@ -291,10 +291,12 @@ fn flip_layers(test: &Layer, reference: &Layer, size: (u32, u32), options: &Comp
     let (mut a, mut b) = (Vec::new(), Vec::new());
     for (test, reference) in test.pixels().zip(reference.pixels()) {
         let finite = test.iter().chain(&reference).all(|v| v.is_finite());
-        let shown = |pixel| if finite { options.tone.apply(pixel) } else { [0; 3] };
-        a.extend(shown(test));
-        b.extend(shown(reference));
+        a.push(if finite { test } else { [0.0; 3] });
+        b.push(if finite { reference } else { [0.0; 3] });
     }
+    // Both by the reference's brightness, or a picture twice as bright would look the same.
+    let shown = |pixels: &[[f32; 3]]| options.tone.display_beside(pixels, &b, size.0).concat();
+    let (a, b) = (shown(&a), shown(&b));
     let picture = |bytes: &[u8]| nv_flip::FlipImageRgb8::with_data(size.0, size.1, bytes);
     nv_flip::flip(picture(&b), picture(&a), options.pixels_per_degree).to_vec()
 }

@@ -17,6 +17,7 @@ pub mod gpu_film;
 pub mod hdr;
 pub mod mark;
 pub mod metrics;
+mod photographic;
 pub mod picture;
 pub mod pixel_format;
 pub mod png;

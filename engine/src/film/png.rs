@@ -27,7 +27,8 @@ pub struct Rgb8 {
 
 /// A layer through a tone map. `width` is the width of the layer's picture.
 pub fn tone_mapped(layer: &Layer, width: u32, tone: &ToneMap) -> Rgb8 {
-    from_pixels(width, layer.pixels().map(|pixel| tone.apply(pixel)))
+    let pixels: Vec<[f32; 3]> = layer.pixels().collect();
+    from_pixels(width, tone.display(&pixels, width).into_iter())
 }
 
 /// Signed difference of two layers of equal size: mean over the channels of `test − reference`, divided by `full_scale`; red is too

@@ -7,7 +7,8 @@
 //! Realistic Rendering", 2013, §2.1 (both forms of visibility) and §7.2 (octahedra rendered live).
 //!
 //! [`OmniShadowMaps`] keep the distances that point lights see in all directions, [`ViewShadowMaps`] those that spots and parallel light see, and say which places their light reaches;
-//! [`SplatAtlas`](splat_atlas::SplatAtlas) keeps those of many lights, drawn at once from points of the surfaces.
+//! [`SplatAtlas`](splat_atlas::SplatAtlas) keeps those of many lights, drawn at once from points of the surfaces. [`Upsampler`](upsample::Upsampler) takes pictures of few pixels to those of
+//! a larger G-buffer.
 //!
 //! Guarantee: what is seen at a pixel is what the ray through its centre meets, but where that centre lies within the rounding of vertices
 //! from an edge of a triangle, or where triangles are equally far within the rounding of depths; distances and weights are the ray caster's
@@ -28,6 +29,7 @@ pub mod splat_atlas;
 pub mod splats;
 mod surfaces;
 pub mod tessellation;
+pub mod upsample;
 mod view;
 pub(crate) mod view_shadow;
 

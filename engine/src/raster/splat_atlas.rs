@@ -498,7 +498,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "SVO-G3",
     name: "imperfect shadow maps: octahedra about many places at once, of discs about points of the surfaces, with holes filled (BG-11)",
     role: Role::PartOf("SVO-P12"),
-    limits: "Silhouettes are too wide by the radius of discs, surfaces show through where no disc lies, and cut-outs are opaque; texels off by a tenth fall by the power −0.4 of the points, from 22 % of 32² in a room with 128 to 3 % with 16,384; octahedra have both sides of a light's surface.",
+    limits: "For visibility alone: further bounces come by walks, not from what points are seen; silhouettes are too wide by the radius of discs, surfaces show through where no disc lies, and cut-outs are opaque; texels off by a tenth fall by the power −0.4 of the points, from 22 % of 32² in a room with 128 to 3 % with 16,384; octahedra have both sides of a light's surface.",
     sources: &[
         sources::RITSCHEL_2008.whole(),
         sources::BOTSCH_2005.whole(),

@@ -91,6 +91,29 @@ mod tests {
         }
     }
 
+    /// In a sphere of radius 1 the term is a quarter for every two points, so that half of that leaves half of each edge: with an albedo of 0.8, what steps of compensation leave out.
+    #[test]
+    fn steps_leave_a_geometric_series_in_a_sphere() {
+        let mut random = Random(6);
+        let mut direction = || {
+            let z = 2.0 * f64::from(random.unit()) - 1.0;
+            let angle = std::f64::consts::TAU * f64::from(random.unit());
+            let r = (1.0 - z * z).sqrt();
+            glam::DVec3::new(r * angle.cos(), r * angle.sin(), z)
+        };
+        for _ in 0..1000 {
+            let (a, b) = (direction(), direction());
+            let squared = (b - a).length_squared();
+            let [cos_a, cos_b] = [(a, a - b), (b, b - a)].map(|(normal, way)| normal.dot(way) / squared.sqrt());
+            assert!((geometry_term(cos_a, cos_b, squared) - 0.25).abs() < 1e-12);
+            let left_out = 1.0 - bounded_share(EdgeBound::Geometry(0.125), cos_a, cos_b, squared);
+            for (steps, expected) in [(1, 0.4), (2, 0.16), (3, 0.064)] {
+                let residual = (0.8 * left_out).powi(steps);
+                assert!((residual - expected).abs() < 1e-12, "{steps}: {residual}");
+            }
+        }
+    }
+
     #[test]
     fn points_at_one_place_have_a_share_that_is_a_number() {
         for bound in [EdgeBound::Geometry(3.0), EdgeBound::Distance(3.0)] {

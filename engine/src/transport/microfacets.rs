@@ -84,7 +84,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-B3",
         name: "Beckmann distribution of microfacets",
         role: Role::PartOf("BG-3"),
-        limits: "Isotropic metals alone, uncompensated for multiple scattering, and not in the preview.",
+        limits: "Isotropic metals alone, uncompensated for multiple scattering, and not in the preview; no other renderer's pictures are beside it, since Mitsuba masks it by Smith's term, which is not there.",
         sources: &[sources::BECKMANN_SPIZZICHINO_1963.whole()],
         ..ROW
     },

@@ -34,6 +34,7 @@ layout(push_constant, scalar) uniform Push {
     uint end_place;
     uint interleave;   // tiles along a side
     uint subsets;      // of the lights
+    uint first_subset; // of the first tile
     uint first_map;    // light of the first shadow map
     int map_side;      // texels
 } push;
@@ -131,7 +132,8 @@ void main() {
     }
     GatherState at = split_states[place];
     uint tile = place / interleave_stride(uvec2(push.seen.width, push.seen.height), push.interleave);
-    uint end = min(interleave_lights(tile % push.subsets, push.subsets, push.lights).y, push.end_light);
+    uint subset = interleave_subset_of_tile(tile, push.first_subset, push.subsets);
+    uint end = min(interleave_lights(subset, push.subsets, push.lights).y, push.end_light);
     if (at.light >= end) {
         return;
     }

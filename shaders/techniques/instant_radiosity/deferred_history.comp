@@ -18,7 +18,7 @@ layout(local_size_x = 64) in;
 #include "techniques/instant_radiosity/history.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/light_color.glsl"
-#include "techniques/instant_radiosity/seen_normals.glsl"
+#include "raster/seen_normals.glsl"
 #include "transport/luminance.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -76,7 +76,7 @@ bool is_same_surface(Shown a, Shown b) {
 // False where there is nothing.
 bool shown_now(ivec2 pixel, out Shown shown) {
     vec4 position = texelFetch(seen_positions, pixel, 0);
-    vec3 normal = unpack_octahedral(texelFetch(seen_normals, pixel, 0).y, SHADING_NORMAL_BITS);
+    vec3 normal = shading_normal(texelFetch(seen_normals, pixel, 0).xy);
     shown = Shown(position.xyz, texelFetch(seen_objects, pixel, 0).x, normal);
     return position.w != 0.0;
 }

@@ -25,6 +25,7 @@ layout(push_constant, scalar) uniform Push {
     uint height;
     uint interleave;   // tiles along a side
     uint subsets;      // of the lights
+    uint first_subset; // of the first tile
     uint lights;
     float scale;       // of sums over all lights
     float plane_max;   // distance from the tangent plane, m
@@ -44,7 +45,8 @@ layout(set = 0, binding = 4, scalar) restrict buffer Radiance { vec3 radiance[];
 // What a place has of all lights, by its subset of them.
 vec3 merged(uint place) {
     uint tile = place / interleave_stride(uvec2(push.width, push.height), push.interleave);
-    uvec2 of_subset = interleave_lights(tile % push.subsets, push.subsets, push.lights);
+    uint subset = interleave_subset_of_tile(tile, push.first_subset, push.subsets);
+    uvec2 of_subset = interleave_lights(subset, push.subsets, push.lights);
     return split_states[place].sum * (push.scale * (float(push.lights) / float(of_subset.y - of_subset.x)));
 }
 

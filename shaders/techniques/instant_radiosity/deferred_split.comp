@@ -17,8 +17,9 @@ layout(local_size_x = 64) in;
 layout(push_constant, scalar) uniform Push {
     uint width;
     uint height;
-    uint interleave;  // tiles along a side
-    uint subsets;     // of the lights
+    uint interleave;    // tiles along a side
+    uint subsets;       // of the lights
+    uint first_subset;  // of the first tile
     uint lights;
 } push;
 
@@ -41,6 +42,7 @@ void main() {
         seen.weights = texelFetch(seen_weights, ivec2(pixel), 0).xy;
     }
     split_places[place] = seen;
-    uint first = interleave_lights(place / stride % push.subsets, push.subsets, push.lights).x;
+    uint subset = interleave_subset_of_tile(place / stride, push.first_subset, push.subsets);
+    uint first = interleave_lights(subset, push.subsets, push.lights).x;
     split_states[place] = GatherState(vec3(0.0), first, INDEX_START);
 }

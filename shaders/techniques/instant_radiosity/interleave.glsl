@@ -34,6 +34,9 @@ bool interleave_merge(uint place, uvec2 size, uint n, out uvec2 pixel) {
     return within / tile.x < tile.y && pixel.x < size.x && pixel.y < size.y;
 }
 
+// The subset of a tile, where the first tile has the subset `first`.
+uint interleave_subset_of_tile(uint tile, uint first, uint subsets) { return (tile % subsets + first) % subsets; }
+
 // The lights of a subset: consecutive ones, at least one where there are any, and all of them in all subsets where they are no fewer.
 uvec2 interleave_lights(uint subset, uint subsets, uint lights) {
     uint first = subset * lights / subsets;

@@ -7,6 +7,7 @@ layout(constant_id = 41) const bool TELLS_CAUSTICS = false;    // whether a phot
 // One number of each photon decides all of its roulettes; those of a pass are spread evenly, so that as many survive as probabilities say (Keller 1997).
 layout(constant_id = 49) const bool EVEN_SURVIVAL = false;
 layout(constant_id = 48) const bool STORES_LIGHTS = false;     // deposits become virtual lights
+layout(constant_id = 58) const bool ONLY_ROUGH = false;        // photons are scattered by diffuse and glossy lobes alone
 
 layout(constant_id = 54) const bool HAS_CLASSES = false;       // the path set is an expression, which tells photons apart by their class
 

@@ -27,6 +27,8 @@ const PASS_SAMPLES_MAX: u32 = 4096;
 
 /// Samples of a picture at most, of techniques with a bias whose every sample is a frame with lights of its own for all pixels: noise is far below their tolerance then.
 const FRAMES_MAX: u32 = 96;
+/// The same where a frame has hundreds of lights.
+const FRAMES_OF_LIGHTS_MAX: u32 = 32;
 
 /// What the mean over a picture may be wrong by where so many photons light it.
 pub(crate) fn photon_tolerance(photons: f64) -> f64 {
@@ -138,7 +140,11 @@ impl<'a> Easel<'a> {
     fn enough(&self, spp: u32) -> Result<u32> {
         let law = (self.info.foresight.law)(&self.settings())?;
         let are_frames = law.shares_noise && self.has_bias() && !self.has("photons");
-        Ok(if are_frames { spp.min(FRAMES_MAX) } else { spp })
+        Ok(match are_frames {
+            true if self.has("lights") => spp.min(FRAMES_OF_LIGHTS_MAX),
+            true => spp.min(FRAMES_MAX),
+            false => spp,
+        })
     }
 
     fn settings(&self) -> Settings {

@@ -2,6 +2,7 @@
 
 use super::*;
 use clerestory::scene::AlphaMode;
+use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 
 const SAMPLES: u32 = 128;
 
@@ -175,5 +176,37 @@ fn bodies_that_absorb_agree_with_the_path_tracer() {
         add_lit_body(&mut scene, 2.0);
         // Light that goes through the rough surface beside the lamp is rare and bright.
         expect_agreement(gpu, &scene, 8 * SAMPLES, 16_384);
+    });
+}
+
+/// A caustic of a point light, which no eye path finds: what photons bring there, blurred over their kernels, is what light subpaths bring.
+#[test]
+fn caustics_of_a_point_are_the_photon_maps() {
+    with_gpu(|gpu| {
+        let scene = builtin("builtin:cornell-box?source=point&sphere=glass&boxes=none");
+        let blind = traced(gpu, &scene, "bounces=1..", 1024).radiance;
+        let own = passes(gpu, &scene, &settings(), 512).radiance;
+        let photons = PhotonSettings {
+            path_set: "bounces=1..".parse().expect("path set"),
+            photons: 1 << 17,
+            samples_per_pass: 32,
+            seed: 5,
+            ..PhotonSettings::default()
+        };
+        let mut mapper = match PhotonMapper::new(gpu, upload(gpu, &scene), &scene.cameras[0], SIZE, photons) {
+            Ok(mapper) => mapper,
+            Err(error) => panic!("{error}"),
+        };
+        let [mapped, _] = advance(&mut mapper, 128);
+        // Where the map has far more than paths from the eye have.
+        let sums = |values: &[f32]| -> f64 {
+            let triples = mapped.iter().zip(&blind).zip(values);
+            let caustic = triples.filter(|((map, blind), _)| **map > 1.5 * **blind);
+            caustic.map(|(_, value)| f64::from(*value)).sum()
+        };
+        let [caustic, missed, found] = [sums(&mapped), sums(&blind), sums(&own)];
+        println!("{caustic} by photons, {missed} by eye paths, {found} by both ends");
+        assert!(caustic > 0.0 && missed < 0.6 * caustic, "{caustic} {missed}");
+        assert!((found / caustic - 1.0).abs() < 0.1, "{found} instead of {caustic}");
     });
 }

@@ -46,6 +46,7 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("host_frame.comp", "ArrayStride"),
     // A reference that naga does not follow.
     ("cube_probe.comp", "InvalidId"),
+    ("raster/upsample.comp", "InvalidId"),
     ("techniques/instant_radiosity/deferred_history.comp", "InvalidId"),
     ("techniques/instant_radiosity/deferred_merge.comp", "InvalidId"),
     ("techniques/instant_radiosity/deferred_split.comp", "InvalidId"),

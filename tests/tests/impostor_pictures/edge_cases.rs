@@ -2,7 +2,9 @@
 
 use super::*;
 use clerestory::Error;
-use clerestory::techniques::impostors::{ImpostorReflections, ReflectionSettings};
+use clerestory::maps::impostor::room::BoxRoom;
+use clerestory::scene::Projection;
+use clerestory::techniques::impostors::{CaptureBy, ImpostorReflections, ReflectionMethod, ReflectionSettings};
 use clerestory::transport::GpuScene;
 use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::builtin;
@@ -74,6 +76,11 @@ fn what_cannot_be_is_refused_by_name() {
             refused(&fog, technique, Value::Null, "participating media");
             refused(&scene, technique, json!({"side": 0}), "side");
             refused(&scene, technique, json!({"place": [0.0, 1.0]}), "place");
+            // The room's diagonal is 3.46, and its wall at 1.
+            for far in [4.5, 50.0] {
+                let place = json!({"place": [0.0, 0.0, far]});
+                refused(&scene, technique, place, "outside of the scene");
+            }
             refused(
                 &scene,
                 technique,
@@ -108,7 +115,45 @@ fn what_cannot_be_is_refused_by_name() {
     });
 }
 
-/// Spheres at walls, walls in front of the map, maps outside of the room, and an empty sky: pictures are finite, and rays to the sky are counted as such.
+/// Four layers of 2048² texels have 192 MiB of radiance, one has a quarter of it. Devices of larger ranges have room for all that the settings allow.
+#[test]
+fn maps_beyond_a_storage_buffers_range_are_refused() {
+    with_gpu(|gpu| {
+        let bytes = 192 << 20;
+        let range = gpu.caps().max_storage_buffer_range;
+        if range >= bytes {
+            return;
+        }
+        let mut scene = room_with(mirror(), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut scene, 1.0);
+        let on_device = Arc::new(GpuScene::new(gpu, &scene).unwrap());
+        let settings = ReflectionSettings {
+            method: ReflectionMethod::March,
+            steps: 16,
+            capture: CaptureBy::Rays,
+            layers: 4,
+            side: 2048,
+            ..ReflectionSettings::default()
+        };
+        let error = ImpostorReflections::new(gpu, on_device, &scene.cameras[0], [8; 2], settings).err();
+        let Some(Error::LimitExceeded {
+            name,
+            value,
+            limit_name,
+            limit,
+        }) = &error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!(
+            (name.as_str(), *limit_name),
+            ("captured radiance", "maxStorageBufferRange")
+        );
+        assert_eq!((*value, *limit), (bytes, range));
+    });
+}
+
+/// Spheres at walls, walls in front of the map, maps outside of the room as far as may be, and an empty sky: pictures are finite, and rays to the sky are counted as such.
 #[test]
 fn hard_places_give_finite_pictures() {
     with_gpu(|gpu| {
@@ -131,7 +176,7 @@ fn hard_places_give_finite_pictures() {
         let cases = [
             ("at a wall", &at_wall, Value::Null, false),
             ("thin wall before the map", &thin, json!([0.0, 0.0, 0.0]), false),
-            ("outside of the room", &thin, json!([0.0, 0.0, 50.0]), true),
+            ("outside of the room", &thin, json!([0.0, 0.0, 4.4]), true),
             ("within a wall's plane", &at_wall, json!([1.0, 2.0, 0.0]), true),
             ("open to the sky", &open, Value::Null, true),
         ];
@@ -150,6 +195,116 @@ fn hard_places_give_finite_pictures() {
             }
             let settings = json!({"place": place, "side": 64, "lights": 16});
             rendered(&renderer, "localized-gather", SIZE, 4, settings);
+        }
+    });
+}
+
+/// The room with walls that reflect by a lobe as well, and a mirror sphere half-way to one of them, in closed form.
+struct GlossyRoom {
+    radius: f64,
+}
+
+impl GlossyRoom {
+    /// The share of the lobe, and its exponent.
+    const SHARE: f32 = 0.7;
+    const EXPONENT: f32 = 10.0;
+
+    fn scene(&self) -> Scene {
+        let mut scene = room_with(mirror(), B, self.radius, EYE, 1.2, 1.0);
+        lamp(&mut scene, 1.0);
+        for material in scene.materials.iter_mut().filter(|material| material.name == "wall") {
+            *material = Material::phong("wall", material.base_color.truncate(), Self::SHARE, Self::EXPONENT);
+        }
+        scene
+    }
+
+    /// The lamp's light that a wall with this normal, towards the room, sends from a point to a place.
+    fn of_wall(&self, point: DVec3, normal: DVec3, place: DVec3) -> DVec3 {
+        let to_lamp = LAMP.as_dvec3() - point;
+        let (distance, l, v) = (to_lamp.length(), to_lamp.normalize(), (place - point).normalize());
+        let nearest = point + (B - point).dot(l).clamp(0.0, distance) * l;
+        if nearest.distance(B) < self.radius {
+            return DVec3::ZERO;
+        }
+        let cosine = normal.dot(l);
+        let lobe = (2.0 * cosine * normal - l).dot(v).max(0.0);
+        let (share, exponent) = (f64::from(Self::SHARE), f64::from(Self::EXPONENT));
+        let f = (0.5 * share * (exponent + 2.0) * lobe.powf(exponent) + 1.0 - share) / std::f64::consts::PI;
+        INTENSITY.as_dvec3() * albedo_of_wall(normal) * (f * cosine / (distance * distance))
+    }
+
+    /// What the sphere mirrors of the walls along a ray of the eye: as they are seen from where it is mirrored, and from the middle of the sphere.
+    fn mirrored(&self, d: DVec3) -> [DVec3; 2] {
+        let along = (B - EYE).dot(d);
+        let aside = (B - EYE - along * d).length_squared();
+        let x = EYE + (along - (self.radius * self.radius - aside).sqrt()) * d;
+        let n = (x - B) / self.radius;
+        let cosine = -n.dot(d);
+        let r = d + 2.0 * cosine * n;
+        let wall = BoxRoom::EMPTY.surface_from(x, r);
+        let f0 = DVec3::new(0.95, 0.9, 0.8);
+        let reflectance = f0 + (DVec3::ONE - f0) * (1.0 - cosine).powi(5);
+        [x, B].map(|place| reflectance * self.of_wall(x + wall.distance * r, wall.normal, place))
+    }
+
+    /// Pictures of both, black but for some pixels.
+    fn pictures(&self, camera: &Camera, size: u32, pixels: &[usize]) -> [Vec<f32>; 2] {
+        const PARTS: u32 = 8;
+        let Projection::Perspective { fov_y } = camera.projection else {
+            panic!("no perspective");
+        };
+        let half = f64::from(0.5 * fov_y).tan();
+        let at = |i: u32| half * ((2.0 * f64::from(i) + 1.0) / f64::from(size * PARTS) - 1.0);
+        let mut pictures = [0, 1].map(|_| vec![0.0; (3 * size * size) as usize]);
+        for &pixel in pixels {
+            let (left, top) = (pixel as u32 % size * PARTS, pixel as u32 / size * PARTS);
+            let mut sums = [DVec3::ZERO; 2];
+            for part in 0..PARTS * PARTS {
+                let d = DVec3::new(at(left + part % PARTS), -at(top + part / PARTS), -1.0);
+                let mirrored = self.mirrored(camera.transform.transform_vector3(d).normalize());
+                for (sum, value) in sums.iter_mut().zip(mirrored) {
+                    *sum += value / f64::from(PARTS * PARTS);
+                }
+            }
+            for (picture, sum) in pictures.iter_mut().zip(sums) {
+                picture[3 * pixel..3 * pixel + 3].copy_from_slice(&sum.as_vec3().to_array());
+            }
+        }
+        pictures
+    }
+}
+
+/// What lobes send to the map's place is not what they send to a mirror beside it: pictures have the former, as the documentation says with these numbers, and
+/// nothing else is off. It falls with the distance between the two.
+#[test]
+fn glossy_surroundings_are_mirrored_as_the_maps_place_sees_them() {
+    with_gpu(|gpu| {
+        const SIZE: u32 = 24;
+        for (radius, stated) in [(0.3, 0.58), (0.1, 0.19)] {
+            let room = GlossyRoom { radius };
+            let scene = room.scene();
+            let on = pixels_of_sphere(&scene, SIZE, B, radius, true);
+            assert!(on.len() > 200, "{}", on.len());
+            let [truth, by_map] = room.pictures(&scene.cameras[0], SIZE, &on);
+            let [documented, _] = errors(&by_map, &truth, &on);
+            let renderer = renderer(gpu, &scene);
+            let settings = json!({"capture": "rays", "capture_samples": 1, "side": 512, "steps": 8, "sampler": "pcg"});
+            let found = rendered(&renderer, "impostor", SIZE, 1024, settings);
+            let expected = traced(&renderer, &found, SIZE, 1024);
+            let [found, expected] = [&found, &expected].map(|rendered| layer(rendered, "radiance"));
+            let [off, _] = errors(found, &by_map, &on);
+            let [traced_off, _] = errors(expected, &truth, &on);
+            let [whole, bias] = errors(found, expected, &on);
+            println!(
+                "radius {radius}: {documented:.4} documented, {whole:.4} found, bias {bias:+.4}; off beside it {off:.4}, rays {traced_off:.4}"
+            );
+            assert!((documented - stated).abs() < 0.01, "{radius}: {documented}");
+            assert!(traced_off < 0.05, "{radius}: {traced_off}");
+            assert!(off < 0.05, "{radius}: {off}");
+            assert!(
+                (whole - stated).abs() < 0.06 && bias.abs() < 0.06,
+                "{radius}: {whole} {bias}"
+            );
         }
     });
 }

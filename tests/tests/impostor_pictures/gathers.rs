@@ -1,7 +1,13 @@
 //! Indirect light by a localised gather.
 
+use std::f64::consts::PI;
+
 use super::*;
+use clerestory::maps::impostor::room::BoxRoom;
+use clerestory::maps::irradiance::IrradianceSource;
+use clerestory::maps::{MapImage, Parametrization};
 use clerestory::scene::Environment;
+use glam::UVec2;
 
 const RADIUS: f64 = 0.15;
 const SIZE: u32 = 16;
@@ -56,6 +62,77 @@ fn diffuse_rooms_have_the_path_tracers_light_within_the_stated_bias() {
         let [without, _] = of("disc", 32);
         assert!(many < 0.02 && bias.abs() < 0.01, "{many} {bias}");
         assert!(many < few && many < 0.6 * without, "{few} {many} {without}");
+    });
+}
+
+/// Radiance of the wall that is seen in a direction from the middle of the empty room.
+fn lit_wall(direction: DVec3) -> DVec3 {
+    let wall = BoxRoom::EMPTY.surface_from(DVec3::ZERO, direction);
+    let to_lamp = LAMP.as_dvec3() - wall.distance * direction;
+    let irradiance = wall.normal.dot(to_lamp) / to_lamp.length().powi(3);
+    INTENSITY.as_dvec3() * albedo_of_wall(wall.normal) * (irradiance / PI)
+}
+
+/// Three spheres of one object, lit by one map that is seen from the middle of the room. A gather tells their places apart; the irradiance at the map's place
+/// has the same bits for the normals of all.
+#[test]
+fn spheres_of_one_map_are_told_apart_by_their_places() {
+    with_gpu(|gpu| {
+        let places = [B, DVec3::new(-0.5, 0.0, 0.0), DVec3::new(0.0, -0.6, 0.5)];
+        let away = DVec3::new(-0.3, 0.175, -0.225);
+        let mut scene = room_with(matte(), places[0], RADIUS, places[0] + away, 1.0, 1.0);
+        lamp(&mut scene, 1.0);
+        let shell = &mut scene.meshes[SPHERE as usize];
+        let mut normals = vec![shell.normals.clone()];
+        for place in &places[1..] {
+            let other = sphere(0, place.as_vec3(), RADIUS as f32, 96);
+            let first = shell.positions.len() as u32;
+            shell.positions.extend(&other.positions);
+            shell.normals.extend(&other.normals);
+            let corners = other
+                .triangles
+                .iter()
+                .map(|corners| corners.map(|corner| first + corner));
+            shell.triangles.extend(corners);
+            normals.push(other.normals);
+        }
+        let mean = |place: DVec3| {
+            let mut scene = scene.clone();
+            scene.cameras[0].transform.translation = place + away;
+            let renderer = renderer(gpu, &scene);
+            let settings = json!({"object": SPHERE, "place": [0.0, 0.0, 0.0]});
+            let found = rendered(&renderer, "localized-gather", SIZE, 64, settings);
+            let direct = rendered(&renderer, "path", SIZE, 64, json!({"path_set": "bounces=0..1"}));
+            let on = pixels_of_sphere(&scene, SIZE, place, RADIUS, true);
+            assert!(on.len() > 80, "{}", on.len());
+            let [found, direct] = [&found, &direct].map(|rendered| layer(rendered, "radiance"));
+            let mut sum = DVec3::ZERO;
+            for i in on.iter().flat_map(|pixel| 3 * pixel..3 * pixel + 3) {
+                sum[i % 3] += f64::from(found[i]) - f64::from(direct[i]);
+            }
+            sum / on.len() as f64
+        };
+        let means = places.map(mean);
+        println!("{means:?}");
+        for [a, b] in [[0, 1], [0, 2], [1, 2]] {
+            let least = means[a].min(means[b]);
+            let gap = ((means[a] - means[b]) / least).abs().max_element();
+            assert!(least.min_element() > 0.0 && gap > 0.05, "{a} {b}: {gap}");
+        }
+        let (map, size) = (Parametrization::OctahedronQuadratic, UVec2::splat(32));
+        let image = MapImage::from_fn(map, size, |texel| {
+            map.texel_direction(size, texel).map_or(DVec3::ZERO, lit_wall)
+        });
+        let source = IrradianceSource::new(&image.unwrap());
+        let plain: Vec<Vec<[u64; 3]>> = normals
+            .iter()
+            .map(|normals| {
+                let of = |n: &Vec3| source.irradiance(n.as_dvec3()).unwrap().to_array().map(f64::to_bits);
+                normals.iter().step_by(48).map(of).collect()
+            })
+            .collect();
+        assert!(plain[0].iter().all(|bits| f64::from_bits(bits[0]) > 0.05));
+        assert!(plain[1] == plain[0] && plain[2] == plain[0]);
     });
 }
 

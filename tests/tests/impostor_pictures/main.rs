@@ -79,15 +79,25 @@ fn walls(scene: &mut Scene, scale: f32) {
     }
 }
 
-/// A point light of an intensity for half a width of 1.
+/// The lamp's place and intensity for half a width of 1.
+const LAMP: Vec3 = Vec3::new(-0.2, 0.3, 0.2);
+const INTENSITY: Vec3 = Vec3::new(1.0, 0.9, 0.8);
+
+/// A point light.
 fn lamp(scene: &mut Scene, scale: f32) {
     scene.add_light(
         "lamp",
         LightKind::Point {
-            position: scale * Vec3::new(-0.2, 0.3, 0.2),
-            intensity: scale * scale * Vec3::new(1.0, 0.9, 0.8),
+            position: scale * LAMP,
+            intensity: scale * scale * INTENSITY,
         },
     );
+}
+
+/// Albedo of the wall of this normal, towards the room.
+fn albedo_of_wall(normal: DVec3) -> DVec3 {
+    let axis = (0..3_usize).find(|axis| normal[*axis] != 0.0).expect("normal");
+    Vec3::from_array(COLORS[2 * axis + usize::from(normal[axis] > 0.0)]).as_dvec3()
 }
 
 /// Number of the sphere in rooms.

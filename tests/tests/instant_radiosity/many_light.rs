@@ -1,5 +1,6 @@
 //! Deferred frames of many lights against the path tracer, against themselves without tiles, and by exact counts.
 
+mod bounces;
 mod discs;
 mod history;
 mod kept;
@@ -7,6 +8,7 @@ mod metropolis;
 mod reflective;
 mod reservoirs;
 mod tiles;
+mod truths;
 
 use std::collections::BTreeSet;
 
@@ -423,6 +425,13 @@ fn what_frames_cannot_model_is_refused_by_name() {
             (ManyLightSettings { lights: 0, ..exact() }, "lights"),
             (
                 ManyLightSettings {
+                    lights: 10_000_000,
+                    ..exact()
+                },
+                "lights",
+            ),
+            (
+                ManyLightSettings {
                     interleave: 17,
                     ..exact()
                 },
@@ -489,11 +498,20 @@ fn prints_its_hash_when_asked() {
             ..exact()
         };
         all.extend(bits(&picture(gpu, &furnished(), [13, 7], &settings, 1)));
+        for placement in [Placement::Metropolis, Placement::Incremental] {
+            let settings = ManyLightSettings { placement, ..exact() };
+            all.extend(bits(&picture(gpu, &hall(), [13, 7], &settings, 1)));
+        }
         let settings = ManyLightSettings {
-            placement: Placement::Metropolis,
+            placement: Placement::Rsm,
+            gathering: Gathering::Disc,
+            rsm_side: 16,
+            disc_samples: 50,
             ..exact()
         };
         all.extend(bits(&picture(gpu, &hall(), [13, 7], &settings, 1)));
+        let settings = of("bounces=0..4,lobes=diffuse+glossy", exact());
+        all.extend(bits(&picture(gpu, &furnished(), [13, 7], &settings, 2)));
         all.extend(history::bits_of_frames(gpu));
         print_hash(all);
     });

@@ -189,7 +189,11 @@ fn cuts_do_not_depend_on_how_work_is_shared_out() {
 fn threads_and_vector_widths_never_show() {
     let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
     let truth = hash(&[("LP_NUM_THREADS", "1")]);
-    for variables in [&[("LP_NUM_THREADS", "2")][..], &[("LP_NATIVE_VECTOR_WIDTH", "128")]] {
+    for variables in [
+        &[("LP_NUM_THREADS", "2")][..],
+        &[("LP_NATIVE_VECTOR_WIDTH", "128")],
+        &[("LP_NATIVE_VECTOR_WIDTH", "512")],
+    ] {
         assert_eq!(hash(variables), truth, "{variables:?}");
     }
 }

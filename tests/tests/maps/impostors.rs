@@ -1,5 +1,6 @@
 //! Distance impostors on the device: the published errors in rooms whose rays are known exactly, edges, and bits over runs.
 
+use clerestory::Error;
 use clerestory::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery};
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::maps::impostor::layouts::{ImpostorLayout, ImpostorLayouts};
@@ -443,5 +444,37 @@ fn what_cannot_be_searched_is_refused_by_name() {
             search.record(pass, &layered, buffer.slice(0, 128), buffer.slice(128, 128), 1)
         });
         assert!(refused.unwrap_err().to_string().contains("differs in map"));
+    });
+}
+
+/// Eight layers of squares that are a texel too wide for the range. Devices of far larger ranges would want as much of the host.
+#[test]
+fn distances_beyond_a_storage_buffers_range_are_refused() {
+    with_gpu(|gpu| {
+        const LAYERS: u32 = 8;
+        let range = gpu.caps().max_storage_buffer_range;
+        if range > 1 << 28 {
+            return;
+        }
+        let of_texel = u64::from(LAYERS) * size_of::<f32>() as u64;
+        let side = (range / of_texel).isqrt() as u32 + 1;
+        let count = (LAYERS * side * side) as usize;
+        let map = Parametrization::OctahedronQuadratic;
+        let image = ImpostorImage::new(map, UVec2::splat(side), LAYERS, vec![1.0; count], None).unwrap();
+        let error = Impostor::new(gpu, &image).unwrap_err();
+        let Error::LimitExceeded {
+            name,
+            value,
+            limit_name,
+            limit,
+        } = &error
+        else {
+            panic!("{error}");
+        };
+        assert_eq!(
+            (name.as_str(), *limit_name),
+            ("impostor: distances", "maxStorageBufferRange")
+        );
+        assert_eq!((*value, *limit), (4 * count as u64, range));
     });
 }

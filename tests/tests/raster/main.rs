@@ -11,6 +11,7 @@ mod oracle;
 mod parallel;
 mod splat_atlas;
 mod splats;
+mod upsample;
 mod view_shadows;
 
 use clerestory::gpu::ash::vk;

@@ -12,17 +12,17 @@ use clerestory::film::metrics::{RELATIVE_MSE_OFFSET, relative_mse_epsilon, relat
 
 /// The relative MSE of one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Spread {
-    pub(super) relative_mse: f64,
-    pub(super) standard_error: f64,
+pub(crate) struct Spread {
+    pub(crate) relative_mse: f64,
+    pub(crate) standard_error: f64,
 }
 
 /// Fewest pictures that have a standard error.
-pub(super) const PICTURES_MIN: usize = 3;
+pub(crate) const PICTURES_MIN: usize = 3;
 
 /// Measures pictures of one size; `None` for fewer than [`PICTURES_MIN`], for none of any size and for pictures of another size than the
 /// reference's.
-pub(super) fn measure(pictures: &[Vec<f32>], reference: &[f32]) -> Option<Spread> {
+pub(crate) fn measure(pictures: &[Vec<f32>], reference: &[f32]) -> Option<Spread> {
     if pictures.len() < PICTURES_MIN || reference.is_empty() || pictures.iter().any(|one| one.len() != reference.len())
     {
         return None;

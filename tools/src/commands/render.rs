@@ -134,7 +134,7 @@ pub struct Arguments {
     /// A picture of the same view: prints and reports the error against it
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Exposure of the PNG in stops; by default the scene's
+    /// Exposure of the PNG in stops; by default the scene's, or none where the tone curve goes by the picture's brightness
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = finite)]
     exposure: Option<f64>,
     /// Tone curve of the PNG
@@ -153,6 +153,12 @@ pub enum Tone {
     Srgb,
     /// Khronos PBR Neutral: highlights roll off towards white.
     Neutral,
+    /// L/(1 + L) of each band.
+    Bands,
+    /// By the picture's own brightness, for all pixels alike; `--exposure` is added to it.
+    Photographic,
+    /// By the picture's own brightness, and what is around each pixel.
+    PhotographicLocal,
 }
 
 impl From<Tone> for ToneCurve {
@@ -160,6 +166,9 @@ impl From<Tone> for ToneCurve {
         match tone {
             Tone::Srgb => Self::Srgb,
             Tone::Neutral => Self::PbrNeutral,
+            Tone::Bands => Self::Bands,
+            Tone::Photographic => Self::Photographic,
+            Tone::PhotographicLocal => Self::PhotographicLocal,
         }
     }
 }
@@ -287,9 +296,15 @@ pub fn run(arguments: &Arguments) -> Outcome<ExitCode> {
     drop(renderer);
     let validation = gpu.validation_log();
     drop(gpu);
+    let curve = ToneCurve::from(arguments.tone);
+    let standard = if curve.adapts() {
+        0.0
+    } else {
+        f64::from(scene.defaults.exposure)
+    };
     let tone = ToneMap {
-        exposure: arguments.exposure.unwrap_or(f64::from(scene.defaults.exposure)),
-        curve: arguments.tone.into(),
+        exposure: arguments.exposure.unwrap_or(standard),
+        curve,
     };
     let error = match &reference {
         Some(reference) => Some(measure(arguments, &rendered, reference, tone)?),

@@ -106,7 +106,12 @@ fn metal(material: &Material, alpha: f32) -> Result<String, String> {
                 material.fresnel
             ));
         }
-        _ if material.classic_microfacets.is_some() => return Err("classical microfacets are not exported".into()),
+        // Beckmann's distribution and GGX's are the same on both sides, and what masks them is not.
+        _ if material.classic_microfacets.is_some() => {
+            return Err(
+                "classical microfacets have no counterpart: grooves or a term of one cosine mask them, in Mitsuba Smith's term does".into(),
+            );
+        }
         Some(conductor) => rgb("eta", conductor.eta) + &rgb("k", conductor.k),
         // Schlick's factor with F0 = 1 is 1 at every angle.
         None if material.base_color.truncate() == Vec3::ONE => "<string name=\"material\" value=\"none\"/>".into(),

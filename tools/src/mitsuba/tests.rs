@@ -1,5 +1,7 @@
 use super::*;
-use clerestory::scene::{AlphaMode, ConductorIor, Instance, Light, Material, Mesh};
+use clerestory::scene::{
+    AlphaMode, ConductorIor, Distribution, Geometry, Instance, Light, Material, Mesh, Microfacets,
+};
 use glam::Vec4;
 
 fn quad(corners: [[f32; 3]; 4], material: u32) -> Mesh {
@@ -180,6 +182,23 @@ fn refusals_name_the_material_and_the_reason() {
         message.contains("\"stage\"") && message.contains("shading normals"),
         "{message}"
     );
+}
+
+/// Of all pairs, those with a distribution that Mitsuba has among them.
+#[test]
+fn classical_microfacets_are_refused_for_their_masking() {
+    for distribution in [Distribution::Ggx, Distribution::Beckmann, Distribution::CosineLobe] {
+        for geometry in [Geometry::CookTorrance, Geometry::Simplified] {
+            let mut scene = room();
+            scene.materials[2].name = "metal".into();
+            scene.materials[2].classic_microfacets = Some(Microfacets { distribution, geometry });
+            let message = reasons(&scene);
+            assert!(
+                message.contains("\"metal\"") && message.contains("classical microfacets") && message.contains("Smith"),
+                "{distribution:?} {geometry:?}: {message}"
+            );
+        }
+    }
 }
 
 #[test]

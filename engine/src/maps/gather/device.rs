@@ -111,6 +111,14 @@ impl Gather {
     /// # Errors
     /// [`Error::Setting`] for a point that is not finite in f32, and an axis that is no unit vector; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn gather(&self, points: &[GatherPoint]) -> Result<Vec<DVec3>> {
+        self.gather_timed(points).map(|(values, _)| values)
+    }
+
+    /// The same, with the time of the gather on the device in seconds.
+    ///
+    /// # Errors
+    /// As [`Gather::gather`].
+    pub fn gather_timed(&self, points: &[GatherPoint]) -> Result<(Vec<DVec3>, f64)> {
         for (i, point) in points.iter().enumerate() {
             let refused = |cause: &str| Err(Error::setting(format!("point {i}"), format!("{point:?}"), cause));
             if !point.position.as_vec3().is_finite() {
@@ -121,7 +129,7 @@ impl Gather {
             }
         }
         if points.is_empty() {
-            return Ok(Vec::new());
+            return Ok((Vec::new(), 0.0));
         }
         let gpu = &self.gpu;
         let point = |point: &GatherPoint| DevicePoint {
@@ -136,11 +144,9 @@ impl Gather {
         recorder.pass("gather", |pass| {
             self.record(pass, records.view(), values.view(), points.len() as u32)
         })?;
-        recorder.submit()?.wait()?;
+        let seconds = recorder.submit()?.wait()?.seconds();
         let values: Vec<[f32; 3]> = gpu.read(values.view(), points.len())?;
-        Ok(values
-            .into_iter()
-            .map(|value| DVec3::from_array(value.map(f64::from)))
-            .collect())
+        let values = values.into_iter().map(|value| DVec3::from_array(value.map(f64::from)));
+        Ok((values.collect(), seconds))
     }
 }

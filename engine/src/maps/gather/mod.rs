@@ -44,7 +44,10 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::Yardstick,
         limits: "The same at every place.",
         sources: &[sources::RAMAMOORTHI_HANRAHAN_2001.whole()],
-        tests: &["engine/src/maps/gather/tests/errors.rs::the_map_at_its_place_errs_as_published"],
+        tests: &[
+            "engine/src/maps/gather/tests/errors.rs::the_map_at_its_place_errs_as_published",
+            "tests/tests/impostor_pictures/gathers.rs::spheres_of_one_map_are_told_apart_by_their_places",
+        ],
         api: &["clerestory::maps::irradiance::IrradianceSource"],
         ..Row::of(file!())
     },

@@ -6,6 +6,7 @@
 mod city;
 mod conference;
 mod cornell;
+mod corner_lamp;
 mod fog;
 mod forest;
 mod furnace;
@@ -59,6 +60,7 @@ pub fn catalogue() -> &'static [Entry] {
         volumes::CLOUD,
         conference::CONFERENCE,
         cornell::CORNELL_BOX,
+        corner_lamp::CORNER_LAMP,
         rooms::DIVIDER_ROOM,
         fog::FOG_BOX,
         forest::FOREST,

@@ -1,5 +1,8 @@
 //! Light subpaths of a pass: walks from the lights in one wave, the vertices that they leave, and what these show the camera.
 //!
+//! They are emitted and walked as photons are, by the same functions, waves and queues, in kernels of their own: each vertex carries partial weights of both ends, and follows
+//! no footprint.
+//!
 //! Guarantees: vertices depend on (seed, pass, walk) alone, and have the order of bounces and walks; vertices that do not fit are never lost silently, since the
 //! pass is walked again with room for them; what the camera is shown is summed in integers, so that it is the same bits in whatever order; a submission is a bounded piece of work.
 

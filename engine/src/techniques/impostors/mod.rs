@@ -15,7 +15,7 @@
 //! Bias, all of it:
 //!
 //! - What the map's place does not see is not there: reflections stick to the edges of what hides it. With further layers of surfaces, which a map by rays has, that is what lies behind more surfaces than these.
-//! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same.
+//! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same. In a room whose walls reflect 70 % by Phong lobes of exponent 10, a mirror sphere half-way to a wall is 58 % RMS off with a radius of 0.3 of the room's half width, and 19 % with 0.1.
 //! - Searches end beside surfaces: by how much, [`ImpostorReflections::counts`] and [`LookUp::residual`] say.
 //! - Radiance at texels' middles is joined bilinearly, so that borders of shadows are up to half a texel off; with a capture by rays its noise stays, and is the same for all seeds.
 //! - A second interface that no ray of the first samples meets is passed over.
@@ -42,6 +42,6 @@ pub use capture::CaptureBy;
 pub(super) use card::CARD;
 pub(in crate::techniques) use card::map_refusals;
 pub use reflections::ImpostorReflections;
-pub(in crate::techniques) use settings::check_place;
 pub use settings::{ReflectionMethod, ReflectionSettings};
+pub(in crate::techniques) use settings::{check_place, check_place_about};
 pub use stage::{LookUp, LookUpCounts};

@@ -10,7 +10,7 @@ use super::capture::{Capture, CaptureBy, CapturePlan, Captured, middle_of};
 use super::card::refusals_with;
 use super::interfaces::Interfaces;
 use super::renderer::{MapRenderer, MapUse, eye_settings};
-use super::settings::{ReflectionMethod, ReflectionSettings};
+use super::settings::{ReflectionMethod, ReflectionSettings, check_place_about};
 use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
@@ -125,7 +125,7 @@ impl ImpostorReflections {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a setting or size out of range, for a reflector that is none, and for a method without distances where bodies absorb; [`Error::Unsupported`] for a scene with participating media, with
+    /// [`Error::Setting`] for a setting or size out of range, for a place far outside of the scene, for a reflector that is none, and for a method without distances where bodies absorb; [`Error::Unsupported`] for a scene with participating media, with
     /// surfaces that transmit, unless rays are to be [refracted](ReflectionSettings::refracts), or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
     /// [`Error::OutOfMemory`].
     pub fn new(
@@ -148,6 +148,7 @@ impl ImpostorReflections {
             return Err(Error::setting("method", "classical", cause));
         }
         let surfaces = scene.surfaces();
+        check_place_about(settings.place, surfaces.bounds)?;
         let reflectors = reflectors(surfaces.objects, &settings)?;
         let triangles_of = |objects: &[&ObjectTriangles]| -> Vec<Range<u32>> {
             let ranges = objects.iter().map(|object| object.triangles.clone());

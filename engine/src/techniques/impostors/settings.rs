@@ -1,6 +1,6 @@
 //! Settings of reflections by distance impostors, and the light paths of their pictures.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::capture::CaptureBy;
 use crate::maps::impostor::{ImpostorSettings, MAX_BISECTIONS, MAX_STEPS, SearchMethod};
@@ -81,7 +81,7 @@ crate::settings! {
         pub reflector: Option<u32> = None, in "an object's number, or null";
         /// Where the map is seen from, x, y and z; null for the middle of what reflects.
         ///
-        /// From there, reflections close to a body's middle are right whatever the method.
+        /// From there, reflections close to a body's middle are right whatever the method. Refused are places that are farther outside of the scene's bounds than their diagonal is long.
         pub place: Option<[f32; 3]> = None, in "three finite numbers, or null", unit "m";
         /// How what a reflected ray meets is found in the map; changes the picture.
         pub method: ReflectionMethod = ReflectionMethod::Hybrid;
@@ -180,6 +180,24 @@ pub(in crate::techniques) fn check_place(place: Option<[f32; 3]>) -> Result<()> 
     }
 }
 
+/// Refuses places that are farther outside of a scene's bounds than their diagonal is long: what reflects or is lit is within them.
+pub(in crate::techniques) fn check_place_about(place: Option<[f32; 3]>, bounds: [Vec3; 2]) -> Result<()> {
+    let Some(place) = place.map(Vec3::from_array) else {
+        return Ok(());
+    };
+    let [lower, upper] = bounds.map(|corner| corner.as_dvec3());
+    let (at, diagonal) = (place.as_dvec3(), lower.distance(upper));
+    let outside = (lower - at).max(at - upper).max(DVec3::ZERO).length();
+    // An empty scene has no bounds to be outside of.
+    if diagonal > 0.0 && outside > diagonal {
+        let cause = format!(
+            "is outside of the scene, {outside} m from its bounds {lower} to {upper}; their diagonal is the most"
+        );
+        return Err(Error::setting("place", place, cause));
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -246,6 +264,35 @@ mod tests {
             assert!(error.contains(words), "{error}");
         }
         assert!(defaults().check().is_ok());
+    }
+
+    #[test]
+    fn places_are_about_the_scene() {
+        // The diagonal is 7 long.
+        let bounds = [Vec3::new(-1.0, 0.0, 10.0), Vec3::new(1.0, 3.0, 16.0)];
+        for place in [
+            None,
+            Some([0.0, 1.0, 12.0]),
+            Some([-7.9, 1.0, 12.0]),
+            Some([0.0, 6.9, 21.7]),
+        ] {
+            assert!(check_place_about(place, bounds).is_ok(), "{place:?}");
+        }
+        for place in [
+            [-8.1, 1.0, 12.0],
+            [0.0, 10.1, 12.0],
+            [0.0, 9.9, 22.9],
+            [0.0, 1.0, 2.9],
+            [1e30, 1.0, 12.0],
+        ] {
+            let error = check_place_about(Some(place), bounds).expect_err("place").to_string();
+            assert!(
+                error.contains("setting place") && error.contains("outside of the scene"),
+                "{error}"
+            );
+        }
+        // An empty scene.
+        assert!(check_place_about(Some([5.0, 0.0, 0.0]), [Vec3::ZERO; 2]).is_ok());
     }
 
     #[test]

@@ -10,12 +10,19 @@ use crate::transport::{GpuScene, surface_spec};
 use crate::walk::Bounce;
 
 /// The kernel, for a scene.
-pub(super) struct LightAppend(ComputePipeline<vpl_append::Kernel>);
+pub(super) struct LightAppend {
+    pipeline: ComputePipeline<vpl_append::Kernel>,
+    fewer: &'static str,
+}
 
 impl LightAppend {
-    pub fn new(gpu: &Gpu, scene: &GpuScene) -> Result<Self> {
+    /// `fewer` is what to do where there are more virtual lights than the device can hold.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, fewer: &'static str) -> Result<Self> {
         let spec = surface_spec!(vpl_append, scene, { has_multiple_scattering: false, ..Default::default() });
-        Ok(Self(gpu.compute_pipeline(&spec)?))
+        Ok(Self {
+            pipeline: gpu.compute_pipeline(&spec)?,
+            fewer,
+        })
     }
 }
 
@@ -33,11 +40,11 @@ impl Append for LightAppend {
     }
 
     fn fewer(&self) -> &'static str {
-        "follow fewer walks per pass: setting `walks`"
+        self.fewer
     }
 
     fn pipeline(&self) -> PipelineInfo {
-        self.0.info()
+        self.pipeline.info()
     }
 
     fn append(
@@ -57,6 +64,11 @@ impl Append for LightAppend {
             capacity,
         };
         let set = scene.scene_set();
-        pass.dispatch_indirect(&self.0, &[&bounce.wave, &set, photons], &push, bounce.places.waiting)
+        pass.dispatch_indirect(
+            &self.pipeline,
+            &[&bounce.wave, &set, photons],
+            &push,
+            bounce.places.waiting,
+        )
     }
 }

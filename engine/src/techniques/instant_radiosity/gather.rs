@@ -408,7 +408,7 @@ impl ArrivalStage for GatherStage<'_> {
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "BG-8",
-        name: "gathering from virtual lights under a bound, min(G, b) or max(d², B)",
+        name: "gathering from virtual lights under a bound, min(G, b) or max(d², B) (MET-V2)",
         role: Role::PartOf("SVO-G0"),
         limits: "A bound alone leaves out light near edges and corners, each its own part: of a sphere of radius R, max(d², B) leaves out B/(8R²).",
         sources: &[

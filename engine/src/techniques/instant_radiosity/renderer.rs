@@ -132,12 +132,22 @@ impl VirtualLights {
                 tells_caustics: false,
                 even_survival: settings.fractional,
                 stores_lights: true,
+                only_rough: false,
                 stored: Stored {
                     first_bounce: 0,
                     last_bounce: settings.most().map_or(u32::MAX, |most| most - CONNECTED),
                 },
             };
-            PhotonTracer::new(gpu, Arc::clone(&scene), plan, Box::new(LightAppend::new(gpu, &scene)?))
+            PhotonTracer::new(
+                gpu,
+                Arc::clone(&scene),
+                plan,
+                Box::new(LightAppend::new(
+                    gpu,
+                    &scene,
+                    "follow fewer walks per pass: setting `walks`",
+                )?),
+            )
         });
         let tracer = tracer.transpose()?;
         let eye_settings = PathTracerSettings {

@@ -98,6 +98,7 @@ const ROWS: &[Row] = &[Row {
     needs: capture::NEEDS,
     tests: &[
         "tests/tests/impostor_pictures/gathers.rs::diffuse_rooms_have_the_path_tracers_light_within_the_stated_bias",
+        "tests/tests/impostor_pictures/gathers.rs::spheres_of_one_map_are_told_apart_by_their_places",
         "tests/tests/impostor_pictures/gathers.rs::emission_is_never_counted_twice",
         "tests/tests/impostor_pictures/gathers.rs::spheres_about_the_maps_place_have_the_stated_bias",
         "tests/tests/impostor_pictures/gathers.rs::even_surroundings_keep_their_albedo_at_grazing_views",

@@ -16,6 +16,7 @@ use crate::maps::gather::GatherLights;
 use crate::scene::Camera;
 use crate::settings::TypedSettings;
 use crate::techniques::impostors::capture::{Capture, CapturePlan, Captured, middle_of};
+use crate::techniques::impostors::check_place_about;
 use crate::techniques::impostors::renderer::{MapRenderer, MapUse, eye_settings};
 use crate::techniques::{PathTracer, Skipped};
 use crate::transport::{GpuScene, PathSet};
@@ -86,7 +87,7 @@ impl LocalizedGather {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a setting or size out of range, and for an object that is none; [`Error::Unsupported`] for a scene with participating media, with surfaces that transmit or have other microfacets
+    /// [`Error::Setting`] for a setting or size out of range, for a place far outside of the scene, and for an object that is none; [`Error::Unsupported`] for a scene with participating media, with surfaces that transmit or have other microfacets
     /// than GGX's, or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing; [`Error::OutOfMemory`].
     pub fn new(
         gpu: &Gpu,
@@ -104,6 +105,7 @@ impl LocalizedGather {
             });
         }
         let surfaces = scene.surfaces();
+        check_place_about(settings.place, surfaces.bounds)?;
         let left_out: Vec<Range<u32>> = match settings.object {
             None => Vec::new(),
             Some(number) => {

@@ -38,6 +38,8 @@ crate::settings! {
         /// It is left out of the map. Surfaces of other objects have direct light alone then.
         pub object: Option<u32> = None, in "an object's number, or null";
         /// Where the map is seen from, x, y and z; null for the middle of the object, or of the scene.
+        ///
+        /// Refused are places that are farther outside of the scene's bounds than their diagonal is long.
         pub place: Option<[f32; 3]> = None, in "three finite numbers, or null", unit "m";
         /// Texels along a side of the octahedron of lights, which must divide those of the map; the time of a picture grows with its square.
         ///

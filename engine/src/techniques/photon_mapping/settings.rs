@@ -334,6 +334,7 @@ impl PhotonSettings {
             tells_caustics: self.final_gather,
             even_survival: false,
             stores_lights: false,
+            only_rough: false,
             stored: self.stored(),
         }
     }

@@ -103,6 +103,8 @@ pub(in crate::techniques) struct PhotonPlan {
     pub even_survival: bool,
     /// Deposits are those of virtual lights: of all surfaces that scatter into more than one direction, with the power that arrives.
     pub stores_lights: bool,
+    /// Photons are scattered by diffuse and glossy lobes alone: one specular scattering makes another path set.
+    pub only_rough: bool,
     pub stored: Stored,
 }
 
@@ -314,6 +316,7 @@ impl PhotonTracer {
             has_differentials,
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
+            only_rough: plan.only_rough,
             even_survival: plan.even_survival,
             has_media: profile.media.any(),
             has_classes: classes.is_some(),

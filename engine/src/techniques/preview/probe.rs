@@ -291,7 +291,7 @@ pub(super) const ROWS: &[Row] = &[Row {
     id: "MET-E1",
     name: "classical environment map: what lies in the ray's own direction",
     role: Role::PartOf("CL-PREVIEW"),
-    limits: "The same from everywhere: right at the map's place and for what is infinitely far.",
+    limits: "The same from everywhere: right at the map's place and for what is infinitely far; probes are octahedra, and cubes are maps to search in alone.",
     sources: &[sources::BLINN_NEWELL_1976.whole(), sources::MILLER_HOFFMAN_1984.whole()],
     shaders: &["shaders/techniques/preview/probe.glsl"],
     bias: Some(Bias::Biased("light is taken to come from infinity")),

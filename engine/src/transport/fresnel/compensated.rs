@@ -253,6 +253,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/src/transport/fresnel/compensated.rs::the_slope_is_the_derivative",
         "engine/src/transport/fresnel/compensated.rs::the_rule_gives_what_was_published_and_fails_where_it_was_found_to",
+        "engine/src/transport/fresnel/compensated.rs::the_rule_fails_as_often_as_published",
         "engine/src/transport/fresnel/compensated.rs::guarded_curves_are_never_worse_than_the_rescaled_one",
         "engine/src/transport/fresnel/compensated.rs::fits_are_as_published",
         "engine/src/transport/fresnel/form.rs::forms_err_at_metals_as_published",
@@ -271,16 +272,25 @@ mod tests {
 
     const SAMPLES: u32 = 20_000;
 
-    /// Greatest relative error with a term, %, over 20,001 cosines.
-    fn error(eta: f64, k: f64, compensation: Compensation) -> f64 {
-        let mut worst = 0.0;
+    /// Greatest and mean relative error with a term, %, over 20,001 cosines.
+    fn errors(eta: f64, k: f64, compensation: Compensation) -> [f64; 2] {
+        let [mut worst, mut sum] = [0.0; 2];
         for i in 0..=SAMPLES {
             let c = f64::from(i) / f64::from(SAMPLES);
             let f = exact(c, eta, k);
-            worst = f64::max(worst, (rescaled(c, eta, k) - compensation.term(c) - f).abs() / f);
+            let error = (rescaled(c, eta, k) - compensation.term(c) - f).abs() / f;
+            worst = f64::max(worst, error);
+            sum += error;
         }
-        100.0 * worst
+        [100.0 * worst, 100.0 * sum / f64::from(SAMPLES + 1)]
     }
+
+    fn error(eta: f64, k: f64, compensation: Compensation) -> f64 {
+        errors(eta, k, compensation)[0]
+    }
+
+    /// Percentage points by which an error may miss one that is printed to a hundredth: the farthest is 5.5 thousandths off.
+    const HUNDREDTHS: f64 = 0.006;
 
     #[test]
     fn the_slope_is_the_derivative() {
@@ -304,24 +314,24 @@ mod tests {
     #[test]
     fn the_rule_gives_what_was_published_and_fails_where_it_was_found_to() {
         for metal in METALS {
-            let (found, what) = (rule(metal.n, metal.k), (metal.name, metal.wavelength));
-            // The published numbers are of indices with more digits than are printed: 3 in the last of a, 3·10⁻³ of the exponent.
-            assert!((found.a - metal.rule[0]).abs() < 2e-4, "{what:?}: {found:?}");
-            assert!((found.alpha - metal.rule[1]).abs() < 4e-3, "{what:?}: {found:?}");
-            let guarded = guarded_rule(metal.n, metal.k);
+            let [n, k] = metal.index();
+            let (found, what) = (rule(n, k), (metal.name, metal.wavelength));
+            // Half of the last printed digit, and of an exponent of aluminium a little more.
+            assert!((found.a - metal.rule[0]).abs() < 5e-5, "{what:?}: {found:?}");
+            assert!((found.alpha - metal.rule[1]).abs() < 7e-5, "{what:?}: {found:?}");
+            let guarded = guarded_rule(n, k);
             let fails = matches!(what, ("silver", 550.0 | 435.0) | ("gold", 550.0));
             assert_eq!(guarded.is_none(), fails, "{what:?}");
             if guarded.is_some() {
-                let gap = rescaled(MATCHED_COSINE, metal.n, metal.k)
-                    - found.term(MATCHED_COSINE)
-                    - exact(MATCHED_COSINE, metal.n, metal.k);
+                let gap = rescaled(MATCHED_COSINE, n, k) - found.term(MATCHED_COSINE) - exact(MATCHED_COSINE, n, k);
                 assert!(gap.abs() < 1e-12, "{what:?}: {gap}");
             }
-            let error = error(metal.n, metal.k, found);
-            if metal.compensated[0].is_finite() {
-                assert!((error - metal.compensated[0]).abs() < 0.05, "{what:?}: {error}");
-            } else {
-                assert!(error.is_infinite(), "{what:?}: {error}");
+            for (error, published) in errors(n, k, found).into_iter().zip(metal.compensated) {
+                if published.is_finite() {
+                    assert!((error - published).abs() < HUNDREDTHS, "{what:?}: {error} {published}");
+                } else {
+                    assert!(error.is_infinite(), "{what:?}: {error}");
+                }
             }
         }
         // At n = 1.5, k = 5.
@@ -334,6 +344,21 @@ mod tests {
     }
 
     /// A grid of n from 0.05 to 4 and k from 1 to 9 with 1320 points, as published: 40 × 33.
+    #[test]
+    fn the_rule_fails_as_often_as_published() {
+        let (mut refused, mut worse) = (0, 0);
+        for i in 0..40 {
+            for j in 0..33 {
+                let (n, k) = (0.05 + 3.95 * f64::from(i) / 39.0, 1.0 + 0.25 * f64::from(j));
+                refused += u32::from(guarded_rule(n, k).is_none());
+                let curve = Curve::of(n, k);
+                worse += u32::from(curve.worst(rule(n, k)) > curve.worst(Compensation::NONE));
+            }
+        }
+        assert_eq!((refused, worse), (104, 62));
+    }
+
+    /// On every other point of about the same grid.
     #[test]
     fn guarded_curves_are_never_worse_than_the_rescaled_one() {
         let mut refused = 0;
@@ -349,11 +374,12 @@ mod tests {
         }
         assert!((15..45).contains(&refused), "the guard refuses {refused} of 340");
         for metal in METALS {
-            let (chosen, compensation) = compensation(metal.n, metal.k);
-            let found = error(metal.n, metal.k, compensation);
+            let [n, k] = metal.index();
+            let (chosen, compensation) = compensation(n, k);
+            let found = error(n, k, compensation);
             let bound = metal.rescaled[0].min(metal.compensated[0]).min(metal.fitted[2]);
             assert!(
-                found <= bound + 0.05,
+                found <= bound + HUNDREDTHS,
                 "{} {}: {chosen:?}, {found}",
                 metal.name,
                 metal.wavelength
@@ -372,12 +398,18 @@ mod tests {
     #[test]
     fn fits_are_as_published() {
         for metal in METALS {
-            let found = fitted(metal.n, metal.k);
-            let (what, error) = ((metal.name, metal.wavelength), error(metal.n, metal.k, found));
+            let [n, k] = metal.index();
+            let found = fitted(n, k);
+            let (what, error) = ((metal.name, metal.wavelength), error(n, k, found));
             let [a, alpha, published] = metal.fitted;
-            assert!(error <= published + 0.01, "{what:?}: {error}, published {published}");
-            assert!((found.a - a).abs() < 0.03 * a.max(0.05), "{what:?}: {found:?}");
-            assert!((found.alpha - alpha).abs() < 0.03 * alpha, "{what:?}: {found:?}");
+            assert!(
+                (error - published).abs() < HUNDREDTHS,
+                "{what:?}: {error}, published {published}"
+            );
+            // The coefficient of gold at 435 nm, whose exponent is at its bound, is printed to a hundredth.
+            let digit = if what == ("gold", 435.0) { 0.01 } else { 1e-4 };
+            assert!((found.a - a).abs() < digit, "{what:?}: {found:?}");
+            assert!((found.alpha - alpha).abs() < 1e-3, "{what:?}: {found:?}");
         }
     }
 

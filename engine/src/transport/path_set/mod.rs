@@ -85,6 +85,8 @@ impl PathSet {
     pub const UP_TO_DIFFUSE: Self = Self::simple(0, Some(1), LOBE_DIFFUSE);
     /// Light that is emitted towards the eye, or scattered once or twice, by no mirror: `bounces=0..2,lobes=diffuse+glossy`.
     pub const UP_TO_TWO_ROUGH: Self = Self::simple(0, Some(2), LOBE_DIFFUSE | LOBE_GLOSSY);
+    /// The same, scattered however often: `bounces=0..,lobes=diffuse+glossy`.
+    pub const ROUGH: Self = Self::simple(0, None, LOBE_DIFFUSE | LOBE_GLOSSY);
     /// Light that is emitted towards the eye, or scattered up to four times, diffusely each time: `bounces=0..4,lobes=diffuse`.
     pub const UP_TO_FOUR_DIFFUSE: Self = Self::simple(0, Some(4), LOBE_DIFFUSE);
     /// All but light that comes off a mirror to the first rough surface that the eye sees: `!L.*S[DG]S*E`.

@@ -100,6 +100,7 @@ measures! {
     on_device "alpha" surfaces::alpha;
     on_device "automatic-choice" rendering::automatic_choice;
     on_device "barriers" device::barriers;
+    on_device "bdpt-peers" rendering::bdpt_peers;
     on_device "build-stages" rays::build_stages;
     on_host "camera-footprints" rays::camera_footprints;
     on_device "compact-map" photon_maps::compact_map;
@@ -107,6 +108,7 @@ measures! {
     on_host "convolved-maps" impostors::convolved_maps;
     on_host "coupled-reflection" surfaces::coupled_reflection;
     on_device "cycles" rendering::cycles;
+    on_device "deferred-stages" virtual_lights::deferred_stages;
     on_device "device-model" device::device_model;
     on_host "free-flight" media::free_flight;
     on_device "fresnel-cost" surfaces::fresnel_cost;
@@ -183,6 +185,7 @@ measures! {
     on_host "tree-quality" rays::tree_quality;
     on_host "triangle-tests" rays::triangle_tests;
     on_host "virtual-images" impostors::virtual_images;
+    on_device "upsampling" preview::upsampling;
     on_device "view-shadows" preview::view_shadows;
     on_device "volume-bandwidths" photons::volume_bandwidths;
     on_device "vpl-history" virtual_lights::vpl_history;

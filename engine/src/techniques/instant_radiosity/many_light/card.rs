@@ -50,7 +50,7 @@ const KERNELS: [&ShaderInfo; 13] = [
 /// The catalogue's entry.
 pub(in crate::techniques) const CARD: Card = Card {
     id: "many-light",
-    summary: "many lights on a deferred frame: direct light and one reflection more, of virtual lights from walks, from reflective shadow maps or kept from frame to frame that are shared out among interleaved tiles, with shadow rays, shadow maps, imperfect ones or nothing",
+    summary: "many lights on a deferred frame: direct light and one reflection more, or several, of virtual lights from walks, from reflective shadow maps or kept from frame to frame that are shared out among interleaved tiles, with shadow rays, shadow maps, imperfect ones or nothing",
     rows: &[ROWS],
     bias: BIAS,
     needs: NEEDS,
@@ -212,9 +212,9 @@ const DISPLAYED: &str = "bounces=0..2,lobes=diffuse+glossy+reflection+transmissi
 const ROWS: &[Row] = &[
     Row {
         id: "SVO-P12",
-        name: "technique `many-light`: deferred frames of direct light and of one reflection more by virtual lights, new for each frame or kept",
+        name: "technique `many-light`: deferred frames of direct light and of one reflection more, or several, by virtual lights, new for each frame or kept",
         role: Role::Technique,
-        limits: "One indirect bounce, by lobes other than mirrors; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated.",
+        limits: "Paths by lobes other than mirrors; one indirect bounce of reflective shadow maps and of kept lights, any number of walks and of chains, of which a tile has had all parts after as many frames as there are tiles; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated.",
         sources: &[
             sources::KELLER_1997.whole(),
             sources::SAITO_TAKAHASHI_1990.whole(),
@@ -233,7 +233,13 @@ const ROWS: &[Row] = &[
         needs: NEEDS,
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::frames_with_rays_are_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/bounces.rs::further_bounces_are_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/bounces.rs::walks_go_on_by_rough_lobes_alone",
+            "tests/tests/instant_radiosity/many_light/bounces.rs::tiles_have_all_bounces_over_as_many_frames",
             "tests/tests/instant_radiosity/many_light/tiles.rs::twice_the_lights_are_as_bright",
+            "tests/tests/instant_radiosity/many_light/truths.rs::a_virtual_light_lights_a_plane_as_its_law_says",
+            "tests/tests/instant_radiosity/many_light/truths.rs::errors_fall_with_the_root_of_the_lights",
+            "tests/tests/instant_radiosity/many_light/bounces.rs::further_bounces_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/instant_radiosity/many_light.rs::frames_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/instant_radiosity/many_light.rs::what_is_not_needed_is_not_recorded",
             "tests/tests/instant_radiosity/many_light.rs::scenes_without_lights_are_black_and_walks_that_leave_do_no_harm",
@@ -256,6 +262,7 @@ const ROWS: &[Row] = &[
         bias: Some(Bias::Unbiased),
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers",
+            "tests/tests/instant_radiosity/many_light/truths.rs::points_light_a_plane_as_their_law_says",
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers_through_any_camera",
         ],
         settings: &["path_set"],
@@ -279,6 +286,7 @@ const ROWS: &[Row] = &[
             "engine/src/techniques/instant_radiosity/many_light/interleave.rs::merging_what_was_split_is_exact",
             "engine/src/techniques/instant_radiosity/many_light/interleave.rs::windows_have_every_tile_once_and_workgroups_have_one_tile",
             "engine/src/techniques/instant_radiosity/many_light/interleave.rs::parts_have_every_light_once",
+            "engine/src/techniques/instant_radiosity/many_light/interleave.rs::frames_in_a_row_have_parts_from_all_over",
             "tests/tests/twins/interleave.rs::interleaved_pixels_agree_with_their_twins",
             "tests/tests/instant_radiosity/many_light/tiles.rs::tiles_that_have_all_lights_give_the_same_bits",
             "tests/tests/instant_radiosity/many_light/tiles.rs::parts_of_the_lights_bring_as_much_as_all",
@@ -303,13 +311,14 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/tiles.rs::filters_average_what_lies_in_one_plane_alone",
             "tests/tests/instant_radiosity/many_light/tiles.rs::filters_divide_by_all_that_a_surface_scatters",
             "tests/tests/instant_radiosity/many_light/tiles.rs::filtered_tiles_are_nearly_what_all_lights_bring",
+            "tests/tests/instant_radiosity/many_light/truths.rs::filters_leave_a_sixteenth_of_the_noise",
         ],
         settings: &["filter", "filter_plane", "filter_normal"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/kernels.rs")
     },
     Row {
         id: "SVO-P8",
-        name: "reflective shadow maps of points, spots and directions, and of points of lights with an area and directions of the environment, as virtual lights",
+        name: "reflective shadow maps of points, spots and directions, and of points of lights with an area and directions of the environment, as virtual lights (MET-P7)",
         role: Role::PartOf("SVO-P12"),
         limits: "Light of a texel is where its middle is; a few primary virtual lights a frame stand for lights with an area and the environment.",
         sources: &[
@@ -388,7 +397,7 @@ const ROWS: &[Row] = &[
     },
     Row {
         id: "SVO-G2",
-        name: "incremental instant radiosity: virtual lights of points and spots that are kept from frame to frame, with shares of the power by Voronoi cells of their directions",
+        name: "incremental instant radiosity: virtual lights of points and spots that are kept from frame to frame, with shares of the power by Voronoi cells of their directions (IMS-M18, of surfaces)",
         role: Role::PartOf("SVO-P12"),
         limits: "One bounce in scenes where nothing but lamps moves; what a set of directions misses it misses in every frame, and after a jump of a lamp new lights take frames to come; exact shadow maps are kept of up to 256 lights and 128 MiB, and else drawn anew in every frame.",
         sources: &[sources::LAINE_2007.whole(), sources::SUN_2015.at("§2.2.2")],
@@ -499,7 +508,7 @@ const ROWS: &[Row] = &[
         id: "SVO-B0",
         name: "shadow maps of virtual lights, exact ones of all triangles",
         role: Role::PartOf("SVO-P12"),
-        limits: "An octahedron of all directions for each light, of which its surface hides one half; costs as lights times triangles; contact shadows begin a texel's diagonal late.",
+        limits: "An octahedron of all directions for each light, of which its surface hides one half, where paraboloids and half octahedra have one texel for two; costs as lights times triangles; contact shadows begin a texel's diagonal late.",
         sources: &[
             sources::ENGELHARDT_DACHSBACHER_2008.whole(),
             sources::SUN_2015.at("§1 and §6"),

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use glam::DVec2;
+use glam::{DVec2, UVec4};
 
-use super::kernels::{Seen, Sight, seen_from};
+use super::interleave::Interleaving;
+use super::kernels::{Seen, SharedLights, Sight, seen_from};
 use super::maps::Maps;
 use super::metropolis::{Chains, Metropolis};
 use super::past::Past;
@@ -18,9 +19,12 @@ use crate::scene::camera_frame::CameraFrame;
 use crate::techniques::instant_radiosity::gather::SWEEPS_A_LIGHT;
 use crate::techniques::photon_mapping::Tracing;
 use crate::transport::GpuScene;
-use crate::transport::random::{Sampler, SamplerKind, sample_2d};
+use crate::transport::random::{Sampler, SamplerKind, pcg4d, sample_2d};
 use crate::transport::warp::square_to_disk;
 use crate::{Error, Result};
+
+/// Tells the number that chooses the first tile's part of the lights from others.
+const FIRST_SUBSET_SEED: u32 = 0x7475_726e;
 
 /// A frame under way.
 pub(super) struct Frame {
@@ -375,6 +379,7 @@ impl ManyLight {
             Some(_) => self.settings.lights,
             None => frame.lights,
         };
+        let shared = self.shared(lights);
         let split = self.indirect.as_ref().and_then(Indirect::split);
         let splits = is_last && lights > 0 && split.is_some();
         let timings = self.submit(|own, recorder| {
@@ -387,7 +392,7 @@ impl ManyLight {
             match own.indirect.as_ref().filter(|_| splits).and_then(Indirect::split) {
                 Some(split) => recorder.pass("many-light: split", |pass| {
                     seen.show(pass);
-                    split.record_split(pass, seen, lights)
+                    split.record_split(pass, seen, shared)
                 }),
                 None => Ok(()),
             }
@@ -560,6 +565,22 @@ impl ManyLight {
         }
     }
 
+    /// How tiles share out so many lights of a frame. Those of several bounces lie one bounce behind the other, so that each tile has another part in each frame.
+    fn shared(&self, lights: u32) -> SharedLights {
+        let subsets = self.settings.subsets();
+        let first_subset = if self.settings.has_further_bounces() {
+            let chosen = pcg4d(UVec4::new(self.settings.seed, FIRST_SUBSET_SEED, 0, 0)).x;
+            let on = u64::from(self.number() % subsets) * u64::from(Interleaving::part_step(subsets));
+            ((u64::from(chosen) + on) % u64::from(subsets)) as u32
+        } else {
+            0
+        };
+        SharedLights {
+            count: lights,
+            first_subset,
+        }
+    }
+
     /// Lights of the range whose maps are to be drawn next: all of them, or of those that are kept, where every light has a map, the next ones without theirs.
     fn to_draw(&self, frame: &Frame, lights: Range<u32>) -> Option<Range<u32>> {
         let Indirect { source, maps, .. } = self.indirect.as_ref()?;
@@ -620,6 +641,7 @@ impl ManyLight {
         let work = u64::from(end - place) * u64::from(split.lights_at_once);
         let wanted = u64::from(of_subset.div_ceil(split.lights_at_once)).saturating_sub(sweeps);
         let count = (split.connections / work.max(1)).clamp(1, wanted.max(1)) as u32;
+        let shared = self.shared(frame.lights);
         let timings = self.submit(|own, recorder| {
             let Some((indirect, split)) = own.indirect.as_ref().and_then(|own| Some((own, own.split()?))) else {
                 return Ok(());
@@ -631,7 +653,7 @@ impl ManyLight {
                     pass,
                     &own.scene,
                     frame.from,
-                    (records, frame.lights),
+                    (records, shared),
                     (maps, lights.clone()),
                     (place..end, count),
                 )
@@ -673,12 +695,13 @@ impl ManyLight {
         let at_once = at_once.map_or(all, |split| split.pixels);
         let end = first.saturating_add(at_once).min(all);
         let blends = gathered && self.past().is_some();
+        let shared = self.shared(frame.lights);
         let timings = self.submit(|own, recorder| {
             let split = own.indirect.as_ref().filter(|_| gathered).and_then(Indirect::split);
             if let (Some(split), Some(seen)) = (split, &own.seen) {
                 let target = own.past().map_or(&own.radiance, Past::light);
                 recorder.pass("many-light: merge", |pass| {
-                    split.record_merge(pass, seen, frame.lights, first..end, target)?;
+                    split.record_merge(pass, seen, shared, first..end, target)?;
                     if blends {
                         pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
                     }

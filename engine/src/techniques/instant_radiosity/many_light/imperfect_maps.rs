@@ -18,6 +18,20 @@ const SOFTWARE_SPLATS: u64 = 1 << 22;
 /// On other devices as many as dispatches number with ease.
 const DEVICE_SPLATS: u64 = 1 << 26;
 
+/// Bytes of the places of so many lights.
+fn origins_bytes(lights: u32) -> u64 {
+    u64::from(lights) * size_of::<[f32; 4]>() as u64
+}
+
+/// Room for the places of so many lights.
+fn origins(gpu: &Gpu, lights: u32) -> Result<Buffer> {
+    gpu.buffer(&BufferDesc::storage(
+        "places of virtual lights",
+        origins_bytes(lights),
+        Category::Light,
+    ))
+}
+
 /// Lights whose maps a submission draws.
 pub(super) type Splatting = Range<u32>;
 
@@ -44,17 +58,21 @@ impl ImperfectMaps {
             DeviceKind::Cpu => SOFTWARE_SPLATS,
             _ => DEVICE_SPLATS,
         };
-        let origins = u64::from(settings.lights) * size_of::<[f32; 4]>() as u64;
         Ok(Self {
             atlas: SplatAtlas::new(gpu, surfaces, desc)?,
             places: gpu.compute_pipeline(&Default::default())?,
-            origins: gpu.buffer(&BufferDesc::storage(
-                "places of virtual lights",
-                origins,
-                Category::Light,
-            ))?,
+            origins: origins(gpu, settings.lights)?,
             drawn_at_once: (splats / u64::from(settings.map_points)).max(1) as u32,
         })
+    }
+
+    /// Makes room for the lights of a frame, of which walks may leave more than one each.
+    pub fn begin(&mut self, gpu: &Gpu, lights: u32) -> Result<()> {
+        let least = origins_bytes(lights);
+        if self.origins.bytes() < least {
+            self.origins = origins(gpu, lights)?;
+        }
+        Ok(())
     }
 
     pub fn atlas(&self) -> &SplatAtlas {

@@ -56,6 +56,24 @@ impl Interleaving {
         is_inside.then_some(pixel)
     }
 
+    /// The part of the lights that a tile has, where the first tile has the part `first`.
+    pub fn subset_of_tile(tile: u32, first: u32, subsets: u32) -> u32 {
+        (tile % subsets + first) % subsets
+    }
+
+    /// By how much the part of a tile goes on from frame to frame, so that few frames in a row have parts from all over: about as the golden ratio cuts them, and without a common factor,
+    /// so that as many frames as there are parts have each once.
+    pub fn part_step(subsets: u32) -> u32 {
+        let gcd = |mut a: u32, mut b: u32| {
+            while b > 0 {
+                (a, b) = (b, a % b);
+            }
+            a
+        };
+        let golden = (f64::from(subsets) / std::f64::consts::GOLDEN_RATIO).round() as u32;
+        (golden..=subsets).find(|step| gcd(*step, subsets) == 1).unwrap_or(1)
+    }
+
     /// The lights of a part of them: consecutive ones, at least one where there are any. Where there are no fewer lights than parts, each is in one part.
     pub fn lights(subset: u32, subsets: u32, lights: u32) -> Range<u32> {
         let first = subset * lights / subsets;
@@ -108,6 +126,25 @@ mod tests {
         assert_eq!(split.stride() % INTERLEAVE_GROUP, 0);
         // Neighbours of a tile are neighbours there.
         assert_eq!(split.split([5, 2]) + 1, split.split([9, 2]));
+    }
+
+    #[test]
+    fn frames_in_a_row_have_parts_from_all_over() {
+        for tiles in 1..=16u32 {
+            let subsets = tiles * tiles;
+            let step = Interleaving::part_step(subsets);
+            let part = |frame: u32| frame % subsets * step % subsets;
+            let mut all: Vec<u32> = (0..subsets).map(part).collect();
+            all.sort_unstable();
+            assert!(all.into_iter().eq(0..subsets), "{subsets}");
+            if tiles >= 4 {
+                let mut few: Vec<u32> = (0..4).map(part).collect();
+                few.sort_unstable();
+                let gaps = few.windows(2).map(|pair| pair[1] - pair[0]);
+                let widest = gaps.chain([subsets - few[3] + few[0]]).max();
+                assert!(widest.is_some_and(|gap| 20 * gap < 11 * subsets), "{subsets}: {few:?}");
+            }
+        }
     }
 
     #[test]

@@ -222,6 +222,14 @@ impl Direct {
 
 type Counters = deferred_gather::DeferredCounters;
 
+/// A frame's virtual lights, and how tiles share them out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SharedLights {
+    pub count: u32,
+    /// The part of them that the first tile has.
+    pub first_subset: u32,
+}
+
 /// What sweeps over places have done.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Swept {
@@ -350,14 +358,15 @@ impl Split {
             .sum()
     }
 
-    /// The G-buffer by tiles, before the first of `lights` lights.
-    pub fn record_split(&self, pass: &mut Pass<'_>, seen: &Seen, lights: u32) -> Result<()> {
+    /// The G-buffer by tiles, before the first of the lights.
+    pub fn record_split(&self, pass: &mut Pass<'_>, seen: &Seen, lights: SharedLights) -> Result<()> {
         let push = deferred_split::Push {
             width: self.size[0],
             height: self.size[1],
             interleave: self.tiles,
             subsets: self.subsets,
-            lights,
+            first_subset: lights.first_subset,
+            lights: lights.count,
         };
         let set = deferred_split::Set0 {
             seen_triangles: seen.triangles()?,
@@ -377,7 +386,7 @@ impl Split {
         pass: &mut Pass<'_>,
         scene: &GpuScene,
         from: SeenFrom,
-        (records, lights): (&TexelView, u32),
+        (records, lights): (&TexelView, SharedLights),
         (maps, mapped): (Option<&Maps>, Range<u32>),
         (places, sweeps): (Range<u32>, u32),
     ) -> Result<()> {
@@ -387,12 +396,13 @@ impl Split {
             scene_lower: lower,
             edge_bound: self.bound.value(),
             scene_upper: upper,
-            lights,
+            lights: lights.count,
             end_light: mapped.end,
             first_place: places.start,
             end_place: places.end,
             interleave: self.tiles,
             subsets: self.subsets,
+            first_subset: lights.first_subset,
             first_map: mapped.start,
             map_side: maps.map_or(0, |maps| maps.side() as i32),
         };
@@ -442,7 +452,7 @@ impl Split {
         &self,
         pass: &mut Pass<'_>,
         seen: &Seen,
-        lights: u32,
+        lights: SharedLights,
         pixels: Range<u32>,
         radiance: &Buffer,
     ) -> Result<()> {
@@ -452,7 +462,8 @@ impl Split {
             height: self.size[1],
             interleave: self.tiles,
             subsets: self.subsets,
-            lights,
+            first_subset: lights.first_subset,
+            lights: lights.count,
             scale: self.scale,
             plane_max: self.plane_max,
             normal_min: self.normal_min,

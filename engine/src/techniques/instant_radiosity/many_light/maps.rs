@@ -100,7 +100,7 @@ impl Maps {
     pub fn begin(&mut self, gpu: &Gpu, records: &TexelView, lights: u32) -> Result<()> {
         match self {
             Self::Exact(exact) => exact.begin(gpu, records, lights),
-            Self::Imperfect(_) => Ok(()),
+            Self::Imperfect(imperfect) => imperfect.begin(gpu, lights),
         }
     }
 

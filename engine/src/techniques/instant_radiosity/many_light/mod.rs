@@ -1,4 +1,4 @@
-//! Many lights on the surfaces of a deferred frame: direct light and one reflection more, of virtual lights that are new for each frame
+//! Many lights on the surfaces of a deferred frame: direct light and one reflection more, or several, of virtual lights that are new for each frame
 //! or kept from frame to frame.
 //!
 //! Sources: A. Keller, "Instant Radiosity", SIGGRAPH 1997; A. Keller and W. Heidrich, "Interleaved Sampling", EGWR 2001; B. Segovia et al., "Non-interleaved Deferred
@@ -6,7 +6,7 @@
 //! 2007; C. Dachsbacher and M. Stamminger, "Reflective Shadow Maps", I3D 2005; T. Ritschel et al., "Imperfect Shadow Maps for Efficient Computation of Indirect
 //! Illumination", SIGGRAPH Asia 2008; C. Sun, "Many-Light Real-Time Global Illumination using Sparse Voxel Octree", Master's thesis, WPI, 2015, §3.3 and §4.5 to §4.12.
 //!
-//! A frame is a sample of every pixel: walks from the lights, or points on reflective shadow maps of them, leave a virtual light each where they first land, or those of points and spots are
+//! A frame is a sample of every pixel: walks from the lights, or points on reflective shadow maps of them, leave a virtual light each where they first land (and at each landing further on, where the path set has more than two bounces), or those of points and spots are
 //! kept from frame to frame ([`incremental`](crate::techniques::instant_radiosity::incremental)); a G-buffer is rasterized; a kernel adds what is emitted and
 //! what arrives directly, with two rays a pixel; the G-buffer is split into n × n tiles ([`Interleaving`]), each place gathers from its tile's subset of the virtual
 //! lights, and sums go back to their pixels, where a filter averages those of neighbours on the same surface; a [`history`] blends them with those of the frame before, for
@@ -14,7 +14,7 @@
 //!
 //! # Bias
 //!
-//! Against the same light paths, `bounces=0..2` by lobes other than mirrors:
+//! Against the same light paths, `bounces=0..2`, or up to more, by lobes other than mirrors:
 //!
 //! - *Bound.* Light over edges that are shorter than the bound of the geometry term allows is left out in part, and nothing compensates it.
 //! - *Filter.* The light of neighbours on the same surface is averaged, up to n/2 pixels away: contact shadows are as much softer, and of glossy surfaces so are highlights.
@@ -37,7 +37,8 @@
 //! Transparent surfaces are opaque to all three, to eye and light, which for these light paths is right; what is there in part is refused.
 //!
 //! Without bound and filter and with rays a frame's expected picture is that of its light paths, except that numbers of lights which a tile has follow those which
-//! have landed: an error of the order of one over the walks.
+//! have landed: an error of the order of one over the walks. Virtual lights of several bounces lie one bounce behind the other; a tile's part of them changes from frame to
+//! frame, so that each has all of them over as many frames as there are tiles.
 //!
 //! Guarantees: deterministic in (seed, frame), where lights are kept in where their lamps have been, and with a history in all frames since it began, on any number of threads; a submission is a bounded piece of work; pairs of pixels and lights are nowhere stored; what
 //! settings or scene do not ask for costs no pass and no buffer.

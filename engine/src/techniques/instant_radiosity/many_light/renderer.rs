@@ -27,12 +27,9 @@ use crate::techniques::FrameTarget;
 use crate::techniques::foresight::frame_fits;
 use crate::techniques::instant_radiosity::VirtualLight;
 use crate::techniques::instant_radiosity::append::LightAppend;
-use crate::techniques::photon_mapping::{PhotonCounts, PhotonPlan, PhotonTracer, Stored};
+use crate::techniques::photon_mapping::{PhotonCounts, PhotonPlan, PhotonTracer};
 use crate::transport::{GpuScene, PathSet};
 use crate::{Error, Result};
-
-/// Scatterings of the light that virtual lights bring.
-const CONNECTED: u32 = 2;
 
 /// Exact counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
@@ -191,7 +188,7 @@ impl ManyLight {
         let profile = scene.profile();
         let emits = profile.has_environment() || scene.has_area_lights();
         let shows_direct = (settings.shows(0) && emits) || (settings.shows(1) && scene.has_lights());
-        let shows_indirect = settings.shows(CONNECTED) && scene.has_lights();
+        let shows_indirect = settings.shows_virtual_lights() && scene.has_lights();
         let surfaces = scene.surfaces();
         let pixels = size[0] * size[1];
         let direct = shows_direct.then(|| Direct::new(gpu, &scene, &settings, pixels));
@@ -466,13 +463,21 @@ impl Indirect {
             tells_caustics: false,
             even_survival: false,
             stores_lights: true,
-            // A mirror on the way would be a bounce.
-            stored: Stored {
-                first_bounce: 0,
-                last_bounce: 0,
-            },
+            only_rough: settings.has_further_bounces(),
+            stored: settings.stored(),
         };
-        let tracer = || PhotonTracer::new(gpu, Arc::clone(scene), plan, Box::new(LightAppend::new(gpu, scene)?));
+        let fewer = match settings.placement {
+            Placement::Metropolis => "follow fewer walks per frame: setting `pool`",
+            _ => "follow fewer walks per frame: setting `lights`",
+        };
+        let tracer = || {
+            PhotonTracer::new(
+                gpu,
+                Arc::clone(scene),
+                plan,
+                Box::new(LightAppend::new(gpu, scene, fewer)?),
+            )
+        };
         let source = match settings.placement {
             Placement::Walks => LightSource::Walks(Box::new(tracer()?)),
             Placement::Metropolis => {

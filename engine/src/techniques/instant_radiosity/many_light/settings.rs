@@ -3,6 +3,7 @@
 use crate::gpu::shaders::constants::{RESERVOIR_MEMBERS_MAX, VISIBILITY_MAPS, VISIBILITY_NONE, VISIBILITY_RAYS};
 use crate::techniques::instant_radiosity::incremental::DIRECTIONS_MAX;
 use crate::techniques::instant_radiosity::settings::Bound;
+use crate::techniques::photon_mapping::Stored;
 use crate::transport::PathSet;
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::random::SamplerKind;
@@ -78,6 +79,8 @@ pub enum Gathering {
     Reservoirs,
 }
 
+/// Scatterings that a connection adds to those of a walk: at the virtual light, and where it shines on.
+const CONNECTED: u32 = 2;
 /// Lights that chains choose at most.
 const CHOSEN_MAX: u32 = 4096;
 /// Lights that a pixel draws at most: loops of software drivers end after some iterations.
@@ -88,8 +91,8 @@ const INTERLEAVE_MAX: u32 = 16;
 crate::settings! {
     /// Settings of frames of many lights.
     pub struct ManyLightSettings {
-        /// Virtual lights of each frame: as many walks from the lights, each of which leaves one where it first lands on a surface that is no mirror, points on reflective
-        /// shadow maps, directions of the lamps, or those that chains choose.
+        /// Virtual lights of each frame: as many walks from the lights, each of which leaves one where it first lands on a surface that is no mirror (and, beyond two bounces, where it lands
+        /// further on), points on reflective shadow maps, directions of the lamps, or those that chains choose.
         pub lights: u32 = 512, in 1..=1 << 16, unit "lights per frame";
         /// Where they come from: walks; reflective shadow maps of the lights, drawn anew each frame, whose texels are chosen by what they reflect; or, of points and spots alone,
         /// incremental: they are kept from frame to frame, with exact shadow maps of 128 MiB and 256 lights at most, weighted by the directions of the lamp that are nearest to them; or metropolis: chains choose those of many walks that
@@ -176,8 +179,9 @@ crate::settings! {
         pub map_fill: u32 = 2, in 0..=6, unit "levels";
         /// Owen-scrambled Sobol' points, or independent samples (PCG); changes the noise only.
         pub sampler: SamplerKind = SamplerKind::Sobol;
-        /// Light paths that are shown: all, or those of fewer bounces.
-        pub path_set: PathSet = PathSet::UP_TO_TWO_ROUGH, in "bounces=A..B,lobes=diffuse+glossy, from 0 to 2";
+        /// Light paths that are shown, by the number of their bounces. Beyond two virtual lights come from walks (placement walks or metropolis) that go on, and leave one at each
+        /// landing.
+        pub path_set: PathSet = PathSet::UP_TO_TWO_ROUGH, in "bounces=A..B,lobes=diffuse+glossy";
     }
     unlisted {
         /// Seed of the random numbers. A [`View`](crate::techniques::View) gives its own.
@@ -196,10 +200,14 @@ crate::settings! {
 
 impl ManyLightSettings {
     fn are_sound(&self) -> Result<()> {
-        let (set, all) = (&self.path_set, PathSet::UP_TO_TWO_ROUGH);
+        let (set, all) = (&self.path_set, PathSet::ROUGH);
         let range = PathSet::new(set.min_bounces(), set.max_bounces(), all.lobes()).ok();
         if set.is_empty() || !set.is_subset_of(&all) || range != Some(*set) {
-            let cause = "is no range of bounces of bounces=0..2,lobes=diffuse+glossy";
+            let cause = "is no range of bounces of lobes=diffuse+glossy";
+            return Err(Error::setting("path_set", set, cause));
+        }
+        if self.has_further_bounces() && !matches!(self.placement, Placement::Walks | Placement::Metropolis) {
+            let cause = "needs virtual lights of walks beyond two bounces: placement = \"walks\" or \"metropolis\"";
             return Err(Error::setting("path_set", set, cause));
         }
         if self.has_discs() && self.placement != Placement::Rsm {
@@ -226,6 +234,27 @@ impl ManyLightSettings {
             return Err(Error::setting("rsm_side", self.rsm_side, "is no power of two"));
         }
         Ok(())
+    }
+
+    /// Whether light is shown that virtual lights bring.
+    pub(super) fn shows_virtual_lights(&self) -> bool {
+        self.path_set.max_bounces().is_none_or(|most| most >= CONNECTED)
+    }
+
+    /// Whether light is shown that takes walks which go on from where they first land.
+    pub(super) fn has_further_bounces(&self) -> bool {
+        self.path_set.max_bounces().is_none_or(|most| most > CONNECTED)
+    }
+
+    /// The virtual lights of walks that bring what is shown, by how often they have been scattered.
+    pub(super) fn stored(&self) -> Stored {
+        Stored {
+            first_bounce: self.path_set.min_bounces().saturating_sub(CONNECTED),
+            last_bounce: self
+                .path_set
+                .max_bounces()
+                .map_or(u32::MAX, |most| most.saturating_sub(CONNECTED)),
+        }
     }
 
     /// Whether light is shown that is scattered so often.
@@ -279,7 +308,7 @@ mod tests {
     use crate::settings::TypedSettings;
 
     #[test]
-    fn path_sets_are_ranges_of_up_to_two_bounces() {
+    fn path_sets_are_ranges_of_bounces() {
         let with = |text: &str| ManyLightSettings {
             path_set: text.parse().expect("path set"),
             ..ManyLightSettings::default()
@@ -289,20 +318,47 @@ mod tests {
             ("bounces=2,lobes=diffuse+glossy", [false, false, true, false]),
             ("bounces=0..1,lobes=diffuse+glossy", [true, true, false, false]),
             ("emitted", [true, false, false, false]),
+            ("bounces=1..3,lobes=diffuse+glossy", [false, true, true, true]),
+            ("bounces=3..,lobes=diffuse+glossy", [false, false, false, true]),
         ] {
             let settings = with(text);
             settings.check().expect(text);
             assert_eq!([0, 1, 2, 3].map(|bounces| settings.shows(bounces)), shown, "{text}");
         }
-        for text in [
-            "all",
-            "bounces=0..3,lobes=diffuse+glossy",
-            "direct",
-            "bounces=0..2,lobes=diffuse",
-            "none",
-        ] {
+        for text in ["all", "direct", "bounces=0..2,lobes=diffuse", "none"] {
             let error = with(text).check().expect_err(text).to_string();
             assert!(error.contains("path_set"), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn walks_store_what_two_scatterings_more_bring() {
+        let stored = |text: &str, placement| {
+            let settings = ManyLightSettings {
+                path_set: text.parse().expect("path set"),
+                placement,
+                ..ManyLightSettings::default()
+            };
+            settings.check().map(|()| {
+                let stored = settings.stored();
+                (settings.shows_virtual_lights(), stored.first_bounce, stored.last_bounce)
+            })
+        };
+        for (text, expected) in [
+            ("bounces=0..2,lobes=diffuse+glossy", (true, 0, 0)),
+            ("bounces=0..5,lobes=diffuse+glossy", (true, 0, 3)),
+            ("bounces=3..4,lobes=diffuse+glossy", (true, 1, 2)),
+            ("bounces=1..,lobes=diffuse+glossy", (true, 0, u32::MAX)),
+            ("bounces=0..1,lobes=diffuse+glossy", (false, 0, 0)),
+        ] {
+            for placement in [Placement::Walks, Placement::Metropolis] {
+                assert_eq!(stored(text, placement).expect(text), expected, "{text}");
+            }
+        }
+        for placement in [Placement::Rsm, Placement::Incremental] {
+            let error = stored("bounces=0..3,lobes=diffuse+glossy", placement).expect_err("no walks");
+            assert!(error.to_string().contains("needs virtual lights of walks"), "{error}");
+            stored("bounces=0..2,lobes=diffuse+glossy", placement).expect("two bounces");
         }
     }
 }

@@ -12,6 +12,7 @@ use clerestory::maps::impostor::{Impostor, ImpostorImage, ImpostorRay, ImpostorS
 use clerestory::maps::{MapImage, Parametrization};
 use glam::DVec3;
 
+use super::search_times::{self, Beside, Steps};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::Errors;
@@ -60,6 +61,8 @@ rows! {
 pub struct Found {
     look_ups: Vec<Row>,
     times: Vec<Time>,
+    steps: Vec<Steps>,
+    beside: Vec<Beside>,
 }
 
 const CRITERIA: &[Criterion<Row>] = &[
@@ -460,9 +463,14 @@ impl Study for Found {
             all.extend(timed(context, &gpu, map, beside, side, texels)?);
             Ok(all)
         };
+        let timed_maps = context.first(&maps, 1);
         Ok(Self {
             look_ups: rows,
-            times: context.each(context.first(&maps, 1), Parametrization::to_string, |map| times(*map))?,
+            times: context.each(timed_maps, Parametrization::to_string, |map| times(*map))?,
+            steps: context.each(timed_maps, Parametrization::to_string, |map| {
+                search_times::by_steps(context, &gpu, *map, texels)
+            })?,
+            beside: search_times::beside_rays(context, &gpu, timed_maps, texels)?,
         })
     }
 
@@ -483,6 +491,15 @@ impl Study for Found {
             .note(
                 "Each look-up ends with one fetch of radiance, so that the classical one is that fetch alone. Nearest texels without planes. Published times are those of whole pictures \
                  on a graphics processor of 2004, with all that they have besides; of which of the brackets is not said.",
+            )
+            .and(Findings::of(&self.steps, search_times::OF_STEPS))
+            .note(
+                "False position half-way to a wall, with planes and without radiance. A driver may unroll loops of few turns, so that what the first steps add is not what later ones do.",
+            )
+            .and(Findings::of(&self.beside, search_times::OF_BESIDE))
+            .note(
+                "Rays of a mirror sphere of one metre about the map's place, in turns by the search and by the index that scenes have by default. The map has one layer with planes, found by rays; errors \
+                 are angles at its place against closest hits, and rays whose hit it does not see are among them.",
             )
     }
 }

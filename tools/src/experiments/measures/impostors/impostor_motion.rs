@@ -8,8 +8,9 @@ use clerestory::maps::impostor::{ImpostorSettings, SearchMethod};
 use glam::DVec3;
 
 use super::exact_room::{errors, mean};
-use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, largest, rows};
+use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::greatest;
 
 /// Pixels along a side of a view of the sphere.
 const SIDE: u32 = 220;
@@ -30,6 +31,7 @@ rows! {
     struct Row = "Errors of look-ups while the sphere moves away from its map's place" by [room, share, way] {
         room: String = "room",
         share: f64 = "share of the way",
+        distance: f64 = "mean distance from the map's place to where rays begin",
         way: String = "look-up",
         mean: f64 = "mean error (°)",
         published: Option<f64> = "published mean (°)",
@@ -61,12 +63,19 @@ const CRITERIA: &[Criterion<Row>] = &[
     .among(|row| row.room == EMPTY && row.way.ends_with("+3"))
     .in_every_form(),
     Criterion::each(
-        "the map alone is off from the beginning: mean error (°)",
+        "the map alone is off at the end of the way: mean error (°)",
         Bound::AtLeast(9.0),
         |row: &Row| row.mean.into(),
     )
-    .among(|row| row.room == EMPTY && row.way == way(SearchMethod::Classical, 0))
-    .because("a sphere about the map's place is off by 9.75°"),
+    .among(|row| row.is_of_map_alone() && row.share == 1.0)
+    .because("a sphere about the map's place is off by 9.75° already"),
+    Criterion::all(
+        "the map alone errs the more the farther from its place rays begin: largest mean error over that of the next place away",
+        Bound::AtMost(1.0),
+        worst_over_farther,
+    )
+    .among(Row::is_of_map_alone)
+    .because("the sine of a ray's error is its line's distance from the map's place over that of its hit; the side that is seen passes the place on the way"),
     Criterion::each(
         "what the box hides stays smeared after eight steps: rays below 1° (%)",
         Bound::AtMost(99.0),
@@ -75,6 +84,21 @@ const CRITERIA: &[Criterion<Row>] = &[
     .among(|row| row.room == BOX && row.way == way(SearchMethod::FalsePosition, 8) && row.share == 1.0)
     .because("2 % of the rays of a slightly smaller sphere meet what the map's place does not see"),
 ];
+
+impl Row {
+    /// Whether nothing but the map is looked up, in the room whose surfaces its place sees.
+    fn is_of_map_alone(&self) -> bool {
+        self.room == EMPTY && self.way == way(SearchMethod::Classical, 0)
+    }
+}
+
+/// The largest mean error over that of the place whose rays begin next farther away; `None` of fewer than two places.
+fn worst_over_farther(rows: &[&Row]) -> Option<Measured> {
+    let mut rows = rows.to_vec();
+    rows.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    let ratios = rows.windows(2).map(|pair| pair[0].mean / pair[1].mean);
+    (rows.len() > 1).then(|| greatest(ratios).into())
+}
 
 fn way(method: SearchMethod, steps: u32) -> String {
     format!("{method} +{steps}")
@@ -97,6 +121,8 @@ impl Study for Found {
                 ..ShinySphere::A
             };
             let rays = sphere.rays(side, None);
+            let begins: Vec<f64> = rays.iter().map(|ray| ray.origin.length()).collect();
+            let distance = mean(&begins);
             let row = |(method, steps): (SearchMethod, u32)| {
                 let found = errors(&sphere, &rays, &ImpostorSettings::of(method, steps));
                 let is_published = room.obstacle.is_none() && method == SearchMethod::Classical;
@@ -104,6 +130,7 @@ impl Study for Found {
                 Row {
                     room: name_of(*room).into(),
                     share,
+                    distance,
                     way: way(method, steps),
                     mean: mean(&found),
                     published: published.filter(|_| is_published),
@@ -126,7 +153,7 @@ impl Study for Found {
                 largest(self, is_three, |row| row.mean),
             )
             .note(
-                "A sphere of radius 0.3 moves from the middle of a room of half width 1, where its map is seen from, to (0.55, −0.6, 0.55), and beside a box to (0.5, −0.2, −0.35); it is seen from one place. Published are the ends of the way in the empty \
+                "A sphere of radius 0.3 moves from the middle of a room of half width 1, where its map is seen from, to (0.55, −0.6, 0.55), and beside a box to (0.5, −0.2, −0.35); it is seen from one place, and in the empty room the side that is seen is nearest to the map's place after a fifth of the way. Published are the ends of the way in the empty \
                  room, and pictures of each look-up.",
             )
             .curves("empty", "Errors in an empty room", axes, curves(&of_room(EMPTY), |row| row.way.clone(), at))

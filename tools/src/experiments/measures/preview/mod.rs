@@ -1,4 +1,4 @@
-//! The raster preview: shadows of point lights, and light of maps that are drawn live.
+//! The raster preview: shadows of point lights, light of maps that are drawn live, and light of few pixels at many.
 
 pub mod imperfect_maps;
 pub mod live_map_pictures;
@@ -10,5 +10,6 @@ pub mod reflection_maps;
 mod reflection_stages;
 pub mod shadow_maps;
 mod shadow_places;
+pub mod upsampling;
 pub mod view_shadows;
 pub mod vpl_warp;

@@ -3,6 +3,7 @@
 
 pub mod adaptive_choice;
 pub mod automatic_choice;
+pub mod bdpt_peers;
 pub mod cycles;
 pub mod light_choice;
 pub mod many_lamps;

@@ -10,7 +10,7 @@ use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::settings::Settings;
 use clerestory::techniques::bidirectional::BidirectionalSettings;
-use clerestory::techniques::instant_radiosity::{Bound as EdgeBound, VirtualLightSettings};
+use clerestory::techniques::instant_radiosity::{Bound as EdgeBound, Selection, VirtualLightSettings};
 use clerestory::transport::random::SamplerKind;
 use clerestory::{Result, scene};
 use serde_json::json;
@@ -54,6 +54,7 @@ const BOUNDS: [(&str, f64); 3] = [
     ("virtual lights, a bound of 30", 30.0),
 ];
 const UNBOUNDED: &str = "virtual lights, no bound";
+const CUTS: &str = "virtual lights, cuts of 16";
 const BIDIRECTIONAL: &str = "bidirectional paths";
 
 /// Side of pictures, pictures of each budget, samples per pixel of references.
@@ -130,7 +131,7 @@ struct Variant {
 
 /// All of a scene whose surfaces have that area, m².
 fn variants(address: &str, area: f64) -> Vec<Variant> {
-    let lights = |name, bound, bound_value: f64| Variant {
+    let lights = |name, bound, bound_value: f64, selection| Variant {
         name,
         technique: "vpl",
         paths: 0,
@@ -138,13 +139,22 @@ fn variants(address: &str, area: f64) -> Vec<Variant> {
             walks: WALKS,
             bound,
             bound_value: bound_value as f32,
+            selection,
+            cut_size: 16,
             sampler: SamplerKind::Pcg,
             ..VirtualLightSettings::default()
         }
         .into(),
     };
-    let bounded = BOUNDS.map(|(name, factor)| lights(name, EdgeBound::Geometry, factor * f64::from(WALKS) / area));
-    let unbounded = (address == SPHERE).then(|| lights(UNBOUNDED, EdgeBound::None, 0.0));
+    let bounded = BOUNDS.map(|(name, factor)| {
+        lights(
+            name,
+            EdgeBound::Geometry,
+            factor * f64::from(WALKS) / area,
+            Selection::All,
+        )
+    });
+    let unbounded = (address == SPHERE).then(|| lights(UNBOUNDED, EdgeBound::None, 0.0, Selection::All));
     let bidirectional = Variant {
         name: BIDIRECTIONAL,
         technique: "bdpt",
@@ -157,7 +167,9 @@ fn variants(address: &str, area: f64) -> Vec<Variant> {
         }
         .into(),
     };
-    bounded.into_iter().chain(unbounded).chain([bidirectional]).collect()
+    let cuts = lights(CUTS, EdgeBound::Geometry, f64::from(WALKS) / area, Selection::Cuts);
+    let all = bounded.into_iter().chain(unbounded);
+    all.chain([cuts, bidirectional]).collect()
 }
 
 /// How many pictures are tested in all: each scene's, and one more in the sphere.

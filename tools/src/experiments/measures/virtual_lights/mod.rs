@@ -1,6 +1,7 @@
 //! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, and orders in which points take them; on the device those that are kept from frame to frame,
 //! and light that is.
 
+pub mod deferred_stages;
 mod unit_box;
 pub mod vpl_history;
 pub mod vpl_incremental;

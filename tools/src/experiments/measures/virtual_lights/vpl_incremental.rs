@@ -32,9 +32,9 @@ pub(super) const SCENES: [(&str, bool, Vec3, Vec3); 3] = [
         Vec3::new(0.01, 0.0, 0.0),
     ),
     (
-        "builtin:conference",
+        "builtin:divider-room",
         false,
-        Vec3::new(0.35, 0.8, 0.5),
+        Vec3::new(0.3, 0.6, 0.5),
         Vec3::new(0.005, 0.0, 0.0),
     ),
 ];
