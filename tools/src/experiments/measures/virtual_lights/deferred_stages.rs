@@ -50,7 +50,7 @@ const FULL: Form = Form {
 const SMOKE: Form = Form {
     side: 16,
     lights: &[32, 64],
-    dark_lights: &[32, 128],
+    dark_lights: &[16, 64],
     dark_side: 16,
     frame_side: 12,
     samples: 4,
@@ -120,8 +120,9 @@ rows! {
 }
 rows! {
     /// A frame of 512 walks beside the path tracer on the same light paths.
-    struct Beside = "The error of a frame of 512 walks, and what it costs the path tracer" by [scene] {
+    struct Beside = "The error of a frame of 512 walks, and what it costs the path tracer" by [scene, paths] {
         scene: String = "scene",
+        paths: String = "light paths",
         frame: Repeats = "frame (s)",
         frame_error: Repeats = "relative MSE of a frame",
         sample: Repeats = "path tracer, a sample per pixel (s)",
@@ -356,9 +357,15 @@ fn tiles_of_scene(context: &Context<'_>, gpu: &Gpu, subject: &Subject, name: &st
 }
 
 /// Frames and pictures of the path tracer in turns, against its picture of many samples.
-fn beside_of_scene(context: &Context<'_>, gpu: &Gpu, subject: &Subject, name: &str, form: Form) -> Result<Beside> {
+fn beside_of_scene(
+    context: &Context<'_>,
+    gpu: &Gpu,
+    subject: &Subject,
+    (name, paths_shown): (&str, &str),
+    form: Form,
+) -> Result<Beside> {
     let size = [form.frame_side; 2];
-    let path_set: PathSet = ALL.parse()?;
+    let path_set: PathSet = paths_shown.parse()?;
     let of_paths = |seed| PathTracerSettings {
         path_set,
         sampler: SamplerKind::Pcg,
@@ -376,7 +383,11 @@ fn beside_of_scene(context: &Context<'_>, gpu: &Gpu, subject: &Subject, name: &s
     let error = |picture: &Picture| -> Result<f64> {
         Ok(compare(picture, &reference, &CompareOptions::default())?.relative_mse)
     };
-    let mut frames = subject.renderer(gpu, form.frame_side, ManyLightSettings::default())?;
+    let settings = ManyLightSettings {
+        path_set,
+        ..ManyLightSettings::default()
+    };
+    let mut frames = subject.renderer(gpu, form.frame_side, settings)?;
     let mut tracer = paths(1)?;
     let mut seed = 1;
     let found = context.in_turns(form.turns, 2, |i| {
@@ -402,6 +413,7 @@ fn beside_of_scene(context: &Context<'_>, gpu: &Gpu, subject: &Subject, name: &s
     let turns = found[0].iter().zip(&found[1]);
     Ok(Beside {
         scene: name.into(),
+        paths: paths_shown.into(),
         over: turns
             .map(|([frame, error], [path, path_error])| path * path_error / (frame * error))
             .collect(),
@@ -610,7 +622,9 @@ impl Study for Found {
         let stages = context.each(context.first(&SCENES, 1), name, |address| {
             let subject = Subject::new(&gpu, address)?;
             let name = short_name(address);
-            beside.push(beside_of_scene(context, &gpu, &subject, name, form)?);
+            for paths in [ALL, INDIRECT] {
+                beside.push(beside_of_scene(context, &gpu, &subject, (name, paths), form)?);
+            }
             tiles.push(tiles_of_scene(context, &gpu, &subject, name, form)?);
             stages_of_scene(context, &gpu, &subject, name, form)
         })?;
@@ -657,8 +671,8 @@ impl Study for Found {
             FULL.dark_side
         ));
         let beside = Findings::of(&self.beside, OF_FRAMES).note(format!(
-            "{0} × {0} pixels, wall clock; the path tracer's MSE falls with one over its samples, of which pictures have {1}, and its reference {2}. A frame has the biases of its bound and \
-             its filter, which more frames keep.",
+            "{0} × {0} pixels, wall clock; the path tracer's MSE falls with one over its samples, of which pictures have {1}, and its reference {2}. A frame sees every pixel at the same place in it, so that edges of \
+             lamps and of what is small have all of their error in one frame, and has the biases of its bound and its filter; its time is that of the stages above.",
             FULL.frame_side, FULL.samples, FULL.reference,
         ));
         let all = stages.and(beside).and(tiles).and(dark);

@@ -14,7 +14,7 @@ use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
 use glam::Vec3;
 
-use super::vpl_incremental::{SCENES, Subject};
+use super::vpl_incremental::{self, Subject};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
@@ -39,6 +39,17 @@ const SMOKE: Form = Form {
     kept: 16,
     steps: 3,
 };
+/// As where lights are kept, and one with much that is hidden.
+const SCENES: [(&str, bool, Vec3, Vec3); 3] = [
+    vpl_incremental::SCENES[0],
+    vpl_incremental::SCENES[1],
+    (
+        "builtin:conference",
+        false,
+        Vec3::new(0.35, 0.8, 0.5),
+        Vec3::new(0.005, 0.0, 0.0),
+    ),
+];
 /// Greatest confidences, and a history that keeps nothing.
 const CONFIDENCES: [f32; 2] = [0.9, 0.95];
 const NOTHING: f32 = 1e-6;
