@@ -216,7 +216,7 @@ mod tests {
     fn surroundings_end_at_strong_contrast() {
         let side = 96;
         let value = |x: usize, y: usize| {
-            let pattern = if (x / 2 + y / 2) % 2 == 0 { 1.1 } else { 0.9 };
+            let pattern = if (x / 2 + y / 2).is_multiple_of(2) { 1.1 } else { 0.9 };
             if x < side / 2 { 0.02 * pattern } else { 50.0 * pattern }
         };
         let values: Vec<f64> = (0..side * side).map(|i| value(i % side, i / side)).collect();

@@ -82,7 +82,7 @@ fn a_virtual_light_lights_a_plane_as_its_law_says() {
         }
         // What a Lambertian patch of the power 1 brings, all of which arrives somewhere on the endless plane.
         let per_power = |r2: f64| HEIGHT * HEIGHT / (PI * (HEIGHT * HEIGHT + r2).powi(2));
-        assert!((per_power(0.0) * HEIGHT * HEIGHT - 0.318_31).abs() < 1e-5);
+        assert!((per_power(0.0) * HEIGHT * HEIGHT - std::f64::consts::FRAC_1_PI).abs() < 1e-12);
         let error = worst(&found, |x, z| 0.8 * power * per_power(x * x + z * z));
         println!("{error}");
         assert!(error < 1e-3, "{error}");

@@ -70,7 +70,7 @@ impl Interleaving {
             }
             a
         };
-        let golden = (f64::from(subsets) / std::f64::consts::GOLDEN_RATIO).round() as u32;
+        let golden = (f64::from(subsets) / (0.5 * (1.0 + 5f64.sqrt()))).round() as u32;
         (golden..=subsets).find(|step| gcd(*step, subsets) == 1).unwrap_or(1)
     }
 
