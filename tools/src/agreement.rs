@@ -87,7 +87,7 @@ impl Default for AgreementOptions {
             timing_pictures: 2,
             timing_samples: 256,
             adaptive: Adaptive::Off,
-            python: std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from),
+            python: python_of_environment(),
             output: "out/agreement".into(),
         }
     }
@@ -95,6 +95,12 @@ impl Default for AgreementOptions {
 
 /// The environment variable that names the Python.
 pub const PYTHON_VARIABLE: &str = "CLERESTORY_MITSUBA_PYTHON";
+
+/// The Python that [`PYTHON_VARIABLE`] names, else `python3`.
+pub(crate) fn python_of_environment() -> PathBuf {
+    std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from)
+}
+
 /// First bounce of Russian roulette: that of Mitsuba's path integrator with `rr_depth` 5.
 const ROULETTE_START: u32 = 5;
 /// Edge of the blocks whose means are tested too, pixels.

@@ -4,7 +4,17 @@ use clerestory::Result;
 use clerestory::film::z_test::{ZTest, z_test};
 use clerestory::film::{Picture, picture};
 use clerestory::render::{FrameReport, RenderOptions, Renderer};
+use clerestory::techniques::Technique;
 use serde_json::json;
+
+/// The picture of a technique at work, once it has so many samples per pixel.
+///
+/// # Errors
+/// Those of rendering.
+pub fn finished(technique: &mut impl Technique, samples: u32) -> Result<Picture> {
+    while technique.step(samples)?.is_some() {}
+    Ok(technique.picture()?.0)
+}
 
 /// A picture with the variance of its means.
 pub struct Image {

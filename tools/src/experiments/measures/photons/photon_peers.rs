@@ -4,7 +4,7 @@
 //! Peers run in processes of their own through `tools/mitsuba/photons.py`, with the Python that has Mitsuba; one that is not there is left out,
 //! and a table says so.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use clerestory::atomic;
@@ -14,7 +14,7 @@ use clerestory::techniques::photon_mapping::{MapperCounts, PhotonSettings};
 use clerestory::{Error, Result, scene};
 
 use super::cases::mapper;
-use crate::agreement::PYTHON_VARIABLE;
+use crate::agreement::python_of_environment;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
@@ -193,7 +193,7 @@ impl Row {
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let python: PathBuf = std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from);
+        let python = python_of_environment();
         for (name, text) in SCRIPTS {
             atomic::write(&context.file(name)?, text.as_bytes())?;
         }

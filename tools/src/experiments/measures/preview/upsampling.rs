@@ -18,6 +18,7 @@ use glam::DVec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::pictures::finished;
 use crate::experiments::reference::short_name;
 
 const SCENES: [&str; 3] = ["builtin:cornell-box", "builtin:box-room", "builtin:conference"];
@@ -107,8 +108,7 @@ impl Subject {
         };
         let scene = Arc::clone(&self.on_device);
         let mut renderer = ManyLight::new(gpu, scene, &self.scene.cameras[0], [side; 2], settings)?;
-        while renderer.step(FRAMES)?.is_some() {}
-        let (picture, _) = renderer.picture()?;
+        let picture = finished(&mut renderer, FRAMES)?;
         let values = picture.require(picture::RADIANCE)?.values();
         Ok(values.as_chunks::<3>().0.to_vec())
     }

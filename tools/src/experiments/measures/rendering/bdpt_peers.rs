@@ -3,7 +3,7 @@
 //! LuxCore runs in a process of its own through `tools/mitsuba/bidirectional.py`, with the Python that has it; where there is none, a table says so. Errors are those of the
 //! spread between pictures, each about its own renderer's mean, so that what one renderer models otherwise counts for neither.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 use clerestory::film::picture;
@@ -12,8 +12,7 @@ use clerestory::input::read_file;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Error, Result, atomic, scene};
 
-use crate::agreement::PYTHON_VARIABLE;
-use crate::agreement::spread;
+use crate::agreement::{python_of_environment, spread};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
@@ -141,28 +140,21 @@ impl Contender {
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let python: PathBuf = std::env::var_os(PYTHON_VARIABLE).map_or_else(|| "python3".into(), PathBuf::from);
+        let python = python_of_environment();
         for (name, text) in SCRIPTS {
             atomic::write(&context.file(name)?, text.as_bytes())?;
         }
         let (mut left_out, mut passes) = (Vec::new(), Vec::new());
         let name = |address: &&str| short_name(address).to_owned();
         let rows = context.each(context.first(&SCENES, 1), name, |address| {
-            let name = short_name(address);
-            match of_scene(context, &gpu, &python, address)? {
-                (Ok(row), found) => {
-                    passes.extend(found);
-                    Ok(vec![row])
-                }
-                (Err(cause), found) => {
-                    passes.extend(found);
-                    left_out.push(LeftOut {
-                        scene: name.into(),
-                        cause,
-                    });
-                    Ok(Vec::new())
-                }
-            }
+            let (row, found) = of_scene(context, &gpu, &python, address)?;
+            passes.extend(found);
+            let alone = |cause| LeftOut {
+                scene: short_name(address).into(),
+                cause,
+            };
+            left_out.extend(row.as_ref().err().cloned().map(alone));
+            Ok(Vec::from_iter(row.ok()))
         })?;
         Ok(Self { rows, passes, left_out })
     }

@@ -5,12 +5,12 @@
 //! lights at all pixels, of a frame's error the path tracer of many samples.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use clerestory::film::picture::{self, Picture};
 use clerestory::film::png::{self, Rgb8};
 use clerestory::film::tone::{ToneCurve, ToneMap};
 use clerestory::film::{CompareOptions, compare};
+use clerestory::gpu::shaders::constants::SHADING_NORMAL_BITS;
 use clerestory::gpu::{Area, Gpu, Timings};
 use clerestory::maps::packed_direction::unpack_octahedral;
 use clerestory::raster::{GBuffer, GBufferDesc, Layering, Output, View};
@@ -27,7 +27,9 @@ use crate::experiments::findings::{
     Axes, Bound as Limit, Criterion, Findings, Measured, Repeats, Study, curves, geometric_mean, rows,
 };
 use crate::experiments::measures::Context;
+use crate::experiments::measures::pictures::finished;
 use crate::experiments::reference::short_name;
+use crate::timing::timed;
 
 const SCENES: [&str; 3] = ["builtin:cornell-box", "builtin:box-room", "builtin:conference"];
 /// Scenes in which few lights of many are seen from where the camera is, and one in which most are.
@@ -273,8 +275,7 @@ impl Subject {
     /// A picture of so many frames.
     fn picture(&self, gpu: &Gpu, side: u32, frames: u32, settings: ManyLightSettings) -> Result<Picture> {
         let mut renderer = self.renderer(gpu, side, settings)?;
-        while renderer.step(frames)?.is_some() {}
-        Ok(renderer.picture()?.0)
+        finished(&mut renderer, frames)
     }
 }
 
@@ -377,8 +378,7 @@ fn beside_of_scene(
         PathTracer::new(gpu, scene, &subject.scene.cameras[0], size, of_paths(seed))
     };
     let mut oracle = paths(0)?;
-    while oracle.step(form.reference)?.is_some() {}
-    let (reference, _) = oracle.picture()?;
+    let reference = finished(&mut oracle, form.reference)?;
     drop(oracle);
     let error = |picture: &Picture| -> Result<f64> {
         Ok(compare(picture, &reference, &CompareOptions::default())?.relative_mse)
@@ -392,20 +392,14 @@ fn beside_of_scene(
     let mut seed = 1;
     let found = context.in_turns(form.turns, 2, |i| {
         seed += 1;
-        let begun;
-        let picture = if i == 0 {
+        let (picture, seconds) = if i == 0 {
             frames.restart(seed)?;
-            begun = Instant::now();
-            while frames.step(1)?.is_some() {}
-            frames.picture()?.0
+            timed(|| finished(&mut frames, 1))
         } else {
             tracer.restart(seed)?;
-            begun = Instant::now();
-            while tracer.step(form.samples)?.is_some() {}
-            tracer.picture()?.0
+            timed(|| finished(&mut tracer, form.samples))
         };
-        let seconds = begun.elapsed().as_secs_f64();
-        Ok([seconds, error(&picture)?])
+        Ok([seconds, error(&picture?)?])
     })?;
     let of = |contender: usize, part: usize| Repeats(found[contender].iter().map(|turn| turn[part]).collect());
     let samples = f64::from(form.samples);
@@ -488,7 +482,7 @@ fn seen(gpu: &Gpu, subject: &Subject, view: View, side: u32) -> Result<[Rgb8; 2]
     };
     let is_there = |place: &[f32; 4]| place[3] != 0.0;
     let normals = words.iter().zip(&positions).flat_map(|(words, place)| {
-        let normal = unpack_octahedral(words[1], 16).as_vec3();
+        let normal = unpack_octahedral(words[1], SHADING_NORMAL_BITS).as_vec3();
         shown(if is_there(place) {
             0.5 + 0.5 * normal
         } else {

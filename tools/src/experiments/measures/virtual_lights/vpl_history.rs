@@ -17,6 +17,7 @@ use glam::Vec3;
 use super::vpl_incremental::{self, Subject};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::pictures::finished;
 use crate::experiments::reference::short_name;
 
 const FULL: Form = Form {
@@ -125,8 +126,7 @@ fn renderer(
 /// A frame that begins a picture.
 fn frame(renderer: &mut ManyLight, camera: &Camera) -> Result<Vec<f32>> {
     renderer.set_camera(camera)?;
-    while renderer.step(1)?.is_some() {}
-    let (picture, _) = renderer.picture()?;
+    let picture = finished(renderer, 1)?;
     Ok(picture.require(picture::RADIANCE)?.values().to_vec())
 }
 
