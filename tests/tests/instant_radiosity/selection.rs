@@ -5,9 +5,14 @@ use clerestory::Error;
 use clerestory::gpu::shaders::constants::LIGHT_NODE_LEAF;
 use clerestory::gpu::shaders::types::SceneLightNode;
 use clerestory::techniques::instant_radiosity::Selection;
+use clerestory::techniques::instant_radiosity::selection::{LitPoint, SurfaceLight, potential_contribution};
+use clerestory::transport::edge_bound::EdgeBound;
 use clerestory::transport::light_tree::light_node_union;
+use clerestory_hard_cases::scenes::orthographic;
 use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::gpu;
+use clerestory_tests::render::floor;
+use glam::DVec3;
 
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_HASH";
@@ -355,6 +360,79 @@ fn a_share_of_the_potential_is_exact_where_nothing_is_hidden() {
     });
 }
 
+/// A single light between a floor and a ceiling, and a spot of the floor so small that all of the picture is one place: what the device finds is what the host does.
+#[test]
+fn potentials_are_their_twins() {
+    with_gpu(|gpu| {
+        let (ground, above) = (Vec3::new(0.7, 0.5, 0.3), Vec3::new(0.9, 0.6, 0.4));
+        let mut scene = Scene {
+            name: "gap".into(),
+            ..Scene::default()
+        };
+        for (name, reflectance, height) in [("floor", ground, 0.0), ("ceiling", above, 2.0)] {
+            let matte = scene.add_material(Material::lambert(name, reflectance));
+            scene.place(floor(name, matte, 3.0, height));
+        }
+        let eye = DVec3::Y;
+        scene.cameras.push(orthographic(eye, DVec3::ZERO, -DVec3::Z, 1e-6));
+        add_point(&mut scene, Vec3::Y * 0.25, Vec3::new(3.0, 2.0, 1.0));
+        let point = LitPoint {
+            position: DVec3::ZERO,
+            normal: DVec3::Y,
+            reflectance: ground.as_dvec3(),
+        };
+        for (kind, value, bound) in [
+            (Bound::None, 0.0, EdgeBound::Unbounded),
+            (Bound::Geometry, 0.1, EdgeBound::Geometry(0.1)),
+            (Bound::Distance, 6.0, EdgeBound::Distance(6.0)),
+        ] {
+            let settings = VirtualLightSettings {
+                walks: 1,
+                bound: kind,
+                bound_value: value,
+                least_bounces: 2,
+                most_bounces: 2,
+                ..by_potential(1.0)
+            };
+            let mut renderer = renderer(gpu, &scene, [1, 1], &settings);
+            let (mut lit, mut bounded) = (0, 0);
+            for seed in 0..48 {
+                renderer.restart(seed).expect("a seed");
+                let [found, _] = advance(&mut renderer, 1);
+                let lights = renderer.lights(0).expect("lights");
+                let sum = |bound| -> DVec3 {
+                    let of_light = lights.iter().map(|light| {
+                        let reflectance = if light.position.y > 1.0 { above } else { ground };
+                        let light = SurfaceLight {
+                            position: light.position.into(),
+                            normal: light.normal.into(),
+                            power: (light.power * reflectance).into(),
+                            bounce: light.bounce,
+                        };
+                        potential_contribution(&light, &point, bound)
+                    });
+                    of_light.sum()
+                };
+                let expected = sum(bound);
+                for (value, expected) in found.iter().zip(expected.to_array()) {
+                    let error = (f64::from(*value) - expected).abs();
+                    assert!(
+                        error <= 1e-5 * expected,
+                        "{kind:?}, seed {seed}: {value} instead of {expected}"
+                    );
+                }
+                lit += u32::from(expected != DVec3::ZERO);
+                bounded += u32::from(expected != sum(EdgeBound::Unbounded));
+            }
+            println!("{kind:?}: {lit} of 48 lit, {bounded} bounded");
+            assert!(
+                lit > 10 && (bounded > 3) == (kind != Bound::None),
+                "{kind:?}: {lit} {bounded}"
+            );
+        }
+    });
+}
+
 /// Weak lights are many: a share of the potential takes fewer rays, and less so the smaller it is, with small errors where rescaled and large ones where not.
 #[test]
 fn a_share_of_the_potential_saves_rays_for_little_error() {
@@ -430,5 +508,34 @@ fn selections_out_of_range_are_refused_by_name() {
             matches!(error, Error::Overflow { .. }) && error.to_string().contains("walks"),
             "{error}"
         );
+    });
+}
+
+/// Of more than a million lights the nodes fill no buffer of 128 MiB.
+#[test]
+fn trees_beyond_a_buffer_are_refused_with_their_size() {
+    with_gpu(|gpu| {
+        let most = gpu.caps().max_storage_buffer_range;
+        if most > 1 << 27 {
+            println!("skipped: the device's buffers hold {most} bytes");
+            return;
+        }
+        let many = VirtualLightSettings {
+            walks: 1 << 20,
+            ..cuts(4)
+        };
+        let mut renderer = renderer(gpu, &room(), [1, 1], &many);
+        let error = loop {
+            match renderer.step(1) {
+                Ok(Some(_)) => {}
+                Ok(None) => panic!("must be refused"),
+                Err(error) => break error,
+            }
+        };
+        let text = error.to_string();
+        let Error::Overflow { needed, capacity, .. } = error else {
+            panic!("{text}");
+        };
+        assert!(needed > capacity && text.contains("walks"), "{text}");
     });
 }

@@ -236,6 +236,7 @@ pub(super) const ROWS: &[Row] = &[
             "engine/src/transport/light_tree/cut.rs::larger_cuts_spread_less",
             "engine/src/transport/light_tree/cut.rs::trees_are_perfect_but_for_their_end",
             "tests/tests/instant_radiosity/selection.rs::trees_hold_every_light_once_and_nodes_what_is_below",
+            "tests/tests/instant_radiosity/selection.rs::trees_beyond_a_buffer_are_refused_with_their_size",
             "tests/tests/twins/light_tree.rs::cuts_agree_with_their_twins",
             "tests/tests/twins/light_tree.rs::unions_agree_with_their_twins",
             "tests/tests/instant_radiosity/selection.rs::cuts_agree_with_all_lights",

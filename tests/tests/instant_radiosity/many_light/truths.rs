@@ -117,6 +117,29 @@ fn errors_fall_with_the_root_of_the_lights() {
     });
 }
 
+/// A closed box whose walls emit lights a body at its middle from all sides alike: its sides scatter what a wall emits, times their reflectance.
+#[test]
+fn walls_that_emit_bring_their_own_radiosity() {
+    with_gpu(|gpu| {
+        let mut scene = builtin("builtin:furnace-box?rho=0&emission=1");
+        let reflectance = Vec3::new(0.9, 0.6, 0.3);
+        let matte = scene.add_material(Material::lambert("body", reflectance));
+        let (lower, upper) = (Vec3::splat(-0.25), Vec3::splat(0.25));
+        scene.place(cuboid("body", matte, lower, upper));
+        scene.cameras = vec![orthographic(DVec3::Y * 0.9, DVec3::ZERO, -DVec3::Z, 0.2)];
+        let settings = ManyLightSettings {
+            emitters: 64,
+            sampler: SamplerKind::Sobol,
+            ..of("bounces=1,lobes=diffuse+glossy", exact())
+        };
+        let found = picture(gpu, &scene, SIZE, &settings, 128);
+        for (channel, rho) in reflectance.to_array().into_iter().enumerate() {
+            let ratio = mean(&found, channel) / f64::from(rho);
+            assert!((ratio - 1.0).abs() < 0.01, "{channel}: {ratio}");
+        }
+    });
+}
+
 /// Of sixteen independent parts of the lights, one each at the pixels of a window on a flat surface, the mean has a sixteenth of the variance.
 #[test]
 fn filters_leave_a_sixteenth_of_the_noise() {

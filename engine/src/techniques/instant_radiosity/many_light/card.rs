@@ -238,6 +238,7 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/bounces.rs::tiles_have_all_bounces_over_as_many_frames",
             "tests/tests/instant_radiosity/many_light/tiles.rs::twice_the_lights_are_as_bright",
             "tests/tests/instant_radiosity/many_light/truths.rs::a_virtual_light_lights_a_plane_as_its_law_says",
+            "tests/tests/instant_radiosity/many_light/truths.rs::walls_that_emit_bring_their_own_radiosity",
             "tests/tests/instant_radiosity/many_light/truths.rs::errors_fall_with_the_root_of_the_lights",
             "tests/tests/instant_radiosity/many_light/bounces.rs::further_bounces_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/instant_radiosity/many_light.rs::frames_do_not_depend_on_how_work_is_shared_out",
@@ -336,6 +337,7 @@ const ROWS: &[Row] = &[
         needs: NEEDS,
         tests: &[
             "tests/tests/instant_radiosity/many_light/reflective.rs::each_light_reflects_as_much",
+            "tests/tests/instant_radiosity/many_light/reflective.rs::moved_bodies_are_as_if_made_there",
             "tests/tests/instant_radiosity/many_light/reflective.rs::powers_of_spots_and_of_parallel_light_are_closed_forms",
             "tests/tests/instant_radiosity/many_light/reflective.rs::frames_of_reflective_maps_are_the_path_tracers",
             "tests/tests/instant_radiosity/many_light/reflective.rs::even_sequences_have_the_same_mean_and_less_noise",

@@ -72,6 +72,7 @@ pub(super) const ROWS: &[Row] = &[
         bias: Some(Bias::Biased(LEFT_OUT)),
         tests: &[
             "engine/src/techniques/instant_radiosity/selection/tests.rs::a_share_of_the_potential_needs_the_published_share_of_lights_and_rays",
+            "engine/src/techniques/instant_radiosity/selection/tests.rs::shares_of_lights_hardly_depend_on_the_bound",
             "engine/src/techniques/instant_radiosity/selection/tests.rs::rescaling_is_exact_where_nothing_is_hidden",
             "engine/src/techniques/instant_radiosity/selection/bins.rs::bins_are_quarters_of_octaves",
             "tests/tests/instant_radiosity/selection.rs::a_share_of_the_potential_is_exact_where_nothing_is_hidden",
@@ -122,6 +123,7 @@ pub(super) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/techniques/instant_radiosity/selection/bins.rs::bins_are_quarters_of_octaves",
             "tests/tests/twins/light_tree.rs::unions_agree_with_their_twins",
+            "tests/tests/instant_radiosity/selection.rs::potentials_are_their_twins",
             "tests/tests/instant_radiosity/selection.rs::selections_out_of_range_are_refused_by_name",
         ],
         api: &["clerestory::techniques::instant_radiosity::selection::potential_bin"],

@@ -219,6 +219,34 @@ fn a_share_of_the_potential_needs_the_published_share_of_lights_and_rays() {
     within("lights", sums[11], [105.0, 134.0]);
 }
 
+/// Where a bound ends corners hardly matters to which lights are strong.
+#[test]
+fn shares_of_lights_hardly_depend_on_the_bound() {
+    let scene = UnitBox::new();
+    let points = scene.points();
+    let lights = scene.lights(WALKS, 0, Survival::Roulette);
+    let shares = [0.02f64, 0.1, 0.2].map(|distance| {
+        let bound = EdgeBound::Distance(distance * distance);
+        let (mut ninety, mut eighty) = (0.0, 0.0);
+        for point in &points {
+            let keys = lights
+                .iter()
+                .map(|light| luminance(potential_contribution(light, point, bound)));
+            let keys: Vec<f64> = keys.collect();
+            let order = order_by_potential(&keys);
+            ninety += lights_for_share(&order, &keys, 0.9) as f64;
+            eighty += lights_for_share(&order, &keys, 0.8) as f64;
+        }
+        [ninety, eighty].map(|taken| taken / (points.len() * lights.len()) as f64)
+    });
+    println!("{shares:?}");
+    for other in [shares[0], shares[2]] {
+        for (other, tenth) in other.iter().zip(shares[1]) {
+            assert!((other - tenth).abs() < 0.01, "{shares:?}");
+        }
+    }
+}
+
 /// Rays grow with the period, since more of what is taken is weak; a bubble pass with a limit sorts seldom and takes few more rays than sorting always.
 #[test]
 fn orders_that_are_kept_cost_the_published_rays() {
