@@ -23,6 +23,7 @@ pub mod traverse;
 pub use device::{ResidentWide, WideBuffers, WideBuild, WideBuilder};
 pub use device_refit::{RefittableWide, WideRefitter};
 pub use refit::refit;
+pub(crate) use refit::refit_resident;
 pub use traverse::WideTraversal;
 
 use super::bvh2::{Bvh2, Bvh2Triangle};

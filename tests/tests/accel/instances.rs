@@ -351,6 +351,43 @@ fn moved_instances_and_refitted_meshes_are_as_if_made_so() {
     });
 }
 
+/// Flattened scenes: what is drawn follows at once, and rays once the index is refitted, with the bits of a scene that was made so.
+#[test]
+fn rays_follow_moved_objects_after_a_refit() {
+    with_gpu(|gpu| {
+        let scene = prisms();
+        let mut moved = scene.clone();
+        moved.instances[1].transform = exact(1);
+        let settings = PathTracerSettings::default();
+        for index in ["wide", "wide-device"] {
+            let on_device = uploaded(gpu, &scene, index);
+            let before = picture(gpu, &scene, &on_device, &settings, 2);
+            on_device.move_object(gpu, &scene, 1, exact(1)).unwrap();
+            on_device.refit_index(gpu).unwrap();
+            let found = picture(gpu, &scene, &on_device, &settings, 2);
+            let truth = picture(gpu, &moved, &uploaded(gpu, &moved, index), &settings, 2);
+            assert!(found.bits() == truth.bits() && found.bits() != before.bits(), "{index}");
+            // Of a scene where nothing has moved since: the same tree.
+            on_device.refit_index(gpu).unwrap();
+            assert!(
+                picture(gpu, &scene, &on_device, &settings, 2).bits() == truth.bits(),
+                "{index}"
+            );
+        }
+        for index in ["bvh2", "two-level"] {
+            let refused = uploaded(gpu, &scene, index).refit_index(gpu);
+            assert!(matches!(refused, Err(Error::Setting { .. })), "{index}: {refused:?}");
+        }
+        // Nothing to meet.
+        let empty = Scene {
+            instances: Vec::new(),
+            meshes: Vec::new(),
+            ..scene
+        };
+        uploaded(gpu, &empty, "wide").refit_index(gpu).unwrap();
+    });
+}
+
 /// Walks from the lights follow what moves, as eye paths do.
 #[test]
 fn virtual_lights_and_light_subpaths_follow_moved_instances() {

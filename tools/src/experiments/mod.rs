@@ -60,6 +60,9 @@ pub struct Experiment {
     pub title: String,
     /// What is compared with which oracle, on which inputs, and what counts as good: two or three sentences.
     pub about: String,
+    /// Why what is not good of a sweep is not. Measures say so in their notes.
+    #[serde(default)]
+    pub causes: String,
     /// Ids of the catalogue's rows that it measures.
     pub systems: Vec<String>,
     /// What shows each of them, by its id: the name of a criterion, a column, what stands in one; of a sweep a criterion, a variant, a technique

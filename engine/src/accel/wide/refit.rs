@@ -4,11 +4,12 @@
 //! trying all triangles. Twin of the kernels `wide_refit_triangles` and `wide_refit`.
 
 use super::frame::set_boxes;
-use super::{SLOTS, WideBvh, WideNode};
+use super::{SLOTS, WideBvh, WideNode, texels_of};
 use crate::Result;
 use crate::accel::bvh2::Bvh2Triangle;
 use crate::accel::lbvh::{check_moved, moved_corners};
 use crate::accel::{Aabb, BuildStages, IndexStatistics, RayIndex};
+use crate::gpu::{Gpu, TexelView};
 use glam::Vec3;
 
 /// Refits an index to its triangles where they are now: the tree stays what it was, grids, boxes and corners are new. Triangles that were left
@@ -37,6 +38,23 @@ pub fn refit(index: &WideBvh, triangles: &[[Vec3; 3]]) -> Result<WideBvh> {
     };
     let stages = BuildStages::default();
     Ok(WideBvh::assembled(&nodes, &moved, &bounds, statistics, stages))
+}
+
+/// A tree in the device's memory, of those statistics, refitted there: it is brought to the host and back.
+///
+/// # Errors
+/// As [`refit`]; [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+pub(crate) fn refit_resident(
+    gpu: &Gpu,
+    texels: &TexelView,
+    statistics: IndexStatistics,
+    triangles: &[[Vec3; 3]],
+) -> Result<()> {
+    let nodes = statistics.nodes as usize;
+    let count = texels_of(nodes, statistics.triangles as usize);
+    let words = gpu.read(texels.buffer().view(), count)?;
+    let before = WideBvh::of_texels(words, nodes, statistics, BuildStages::default());
+    gpu.upload(texels.buffer(), 0, refit(&before, triangles)?.texels())
 }
 
 /// Sets the boxes of all nodes of a tree, from the triangles up: of nodes whose first, the root, has the number `first_node`, over triangles whose first has

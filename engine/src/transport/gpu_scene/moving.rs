@@ -6,7 +6,7 @@ use super::geometry::{Geometry, corners_of, instances_in_order};
 use super::kept::{met_box, not_kept};
 use super::{GpuScene, Kept, lock};
 use crate::accel::two_level::InstanceTransform;
-use crate::accel::{Aabb, RayIndex, can_be_met};
+use crate::accel::{Aabb, DeviceTraversal, IndexReport, RayIndex, can_be_met, wide};
 use crate::gpu::shaders::types::SceneTriangle;
 use crate::gpu::{Gpu, TexelView};
 use crate::scene::check::check_mesh;
@@ -15,7 +15,8 @@ use crate::{Error, Result};
 
 impl GpuScene {
     /// Puts an object (an instance of the scene, by its index) to another place, for what is rasterized from here on: triangles, normals and tangents
-    /// are as if the scene had been made with it there, bit for bit. The ray index stays, so that rays still meet the object where it was.
+    /// are as if the scene had been made with it there, bit for bit. The ray index stays, so that rays still meet the object where it was, until
+    /// [`GpuScene::refit_index`].
     ///
     /// `scene` is the one that this was made of. Nothing that reads the scene may be under way.
     ///
@@ -80,6 +81,33 @@ impl GpuScene {
         gpu.upload(self.buffers.triangles.buffer(), first, &moved.triangles)?;
         upload(&self.buffers.normals, &moved.normals)?;
         upload(&self.buffers.tangents, &moved.tangents)
+    }
+
+    /// Refits the ray index to where objects have been moved ([`GpuScene::move_object`]): rays meet them there from here on, as if the scene had been made so. The
+    /// tree keeps its form, so rays are fast where little has moved, and what is known of it ([`GpuScene::index_statistics`]) stays that of its build. It is
+    /// brought to the host and back, with all triangles.
+    ///
+    /// Pictures under way must be restarted, or they mix both; nothing that reads the scene may be under way.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for an index that is no wide hierarchy, and for scenes that keep their instances, whose index follows by itself; [`Error::DeviceLost`],
+    /// [`Error::OutOfMemory`].
+    pub fn refit_index(&self, gpu: &Gpu) -> Result<()> {
+        let IndexReport { kind, statistics, .. } = self.index.report;
+        if self.index.traversal != DeviceTraversal::Wide {
+            return Err(Error::setting(
+                "index",
+                kind,
+                "cannot be refitted to objects that moved; wide can",
+            ));
+        }
+        if statistics.triangles == 0 {
+            return Ok(());
+        }
+        let all = statistics.triangles + statistics.excluded_range + statistics.excluded_degenerate;
+        let triangles: Vec<SceneTriangle> = gpu.read(self.buffers.triangles.buffer().view(), all as usize)?;
+        let corners: Vec<[Vec3; 3]> = triangles.iter().map(corners_of).collect();
+        wide::refit_resident(gpu, &self.index.texels, statistics, &corners)
     }
 
     /// Puts instances of the scene, by their numbers, to other places, where instances are kept: rays meet them there from here on, as if the scene had been

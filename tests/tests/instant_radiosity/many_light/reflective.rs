@@ -2,6 +2,7 @@
 
 use super::*;
 use clerestory::techniques::instant_radiosity::many_light::RsmSequence;
+use glam::DAffine3;
 
 /// Of a power of 20 W, in the middle of a closed box that reflects alike everywhere.
 fn lit_box() -> Scene {
@@ -246,35 +247,40 @@ fn reflective_maps_are_drawn_for_no_others_and_shared_out_alike() {
     });
 }
 
-/// A body that moves, where nothing of a frame is told by rays, whose index stays as it was: it is drawn, lit, and hides where it is now, as if made there.
+/// A body that moves: it is drawn, lit, and hides where it is now, as if made there; where rays tell, once the index is refitted.
 #[test]
 fn moved_bodies_are_as_if_made_there() {
     with_gpu(|gpu| {
-        let (scene, moved, to) = {
-            let mut scene = lit_box();
-            let matte = scene.add_material(Material::lambert("body", Vec3::new(0.2, 0.6, 0.8)));
-            scene.place(cuboid("body", matte, Vec3::splat(-0.2), Vec3::splat(0.2)));
-            scene.cameras = vec![orthographic(DVec3::Y * 0.9, DVec3::ZERO, -DVec3::Z, 0.9)];
-            let to = glam::DAffine3::from_translation(DVec3::new(0.25, -0.5, 0.125));
-            let mut moved = scene.clone();
-            moved.instances.last_mut().expect("the body").transform = to;
-            (scene, moved, to)
-        };
+        let mut scene = lit_box();
+        let matte = scene.add_material(Material::lambert("body", Vec3::new(0.2, 0.6, 0.8)));
+        scene.place(cuboid("body", matte, Vec3::splat(-0.2), Vec3::splat(0.2)));
+        scene.cameras = vec![orthographic(DVec3::Y * 0.9, DVec3::ZERO, -DVec3::Z, 0.9)];
         let body = scene.instances.len() - 1;
-        for visibility in [Visibility::Maps, Visibility::Imperfect] {
+        let to = DAffine3::from_translation(DVec3::new(0.25, -0.5, 0.125));
+        let mut moved = scene.clone();
+        moved.instances[body].transform = to;
+        for (visibility, traces) in [
+            (Visibility::Maps, false),
+            (Visibility::Imperfect, false),
+            (Visibility::Rays, true),
+        ] {
+            let base = if traces { exact() } else { of(INDIRECT, rsm()) };
             let settings = ManyLightSettings {
                 visibility,
                 map_side: 16,
                 map_points: 256,
-                ..of(INDIRECT, rsm())
+                ..base
             };
             let on_device = upload(gpu, &scene);
-            let make = |on_device| ManyLight::new(gpu, on_device, &scene.cameras[0], SIZE, settings.clone());
-            let mut renderer = make(on_device.clone()).expect("frames");
+            let made = ManyLight::new(gpu, on_device.clone(), &scene.cameras[0], SIZE, settings.clone());
+            let mut renderer = made.expect("frames");
             let before = bits(&advance(&mut renderer, 1)[0]);
             on_device
                 .move_object(gpu, &scene, body, to)
                 .expect("a place in the box");
+            if traces {
+                on_device.refit_index(gpu).expect("a wide index");
+            }
             renderer.restart(settings.seed).expect("the same seed");
             let found = bits(&advance(&mut renderer, 1)[0]);
             let truth = bits(&picture(gpu, &moved, SIZE, &settings, 1));

@@ -54,6 +54,9 @@ fn page(experiment: &Experiment, stored: Option<&Stored>, found: &Findings, show
     let mut parts = vec![format!("# {}\n", experiment.title), found.summary()];
     parts.extend(shown.first().cloned());
     parts.push(experiment.about.trim_end().to_owned() + "\n");
+    if !experiment.causes.is_empty() {
+        parts.push(experiment.causes.trim_end().to_owned() + "\n");
+    }
     for (index, table) in found.tables.iter().enumerate() {
         let file = format!("{}.csv", index + 1);
         parts.push(if table.is_long {

@@ -208,7 +208,8 @@ impl Study for Found {
             .note(format!(
                 "{SIDE} × {SIDE} pixels, {LIGHTS} walks in each of {FRAMES} frames, the same for all; a neighbour counts within a hundredth of the scene's diagonal of the tangent plane, \
                  and with a cosine of its normal above {NORMAL}. Errors are those of pixels that are not defective. Pixels of both pictures are \
-                 means over their areas, while what tells surfaces apart are their middles: at edges a mean over two surfaces stands for one, which all neighbours hide better.",
+                 means over their areas, while what tells surfaces apart are their middles: at edges a mean over two surfaces stands for one, which all neighbours hide better. Defective are pixels that no neighbour shares a \
+                 surface with: in the conference room legs and arms of chairs are thinner than a pixel of the small picture.",
             ))
     }
 }

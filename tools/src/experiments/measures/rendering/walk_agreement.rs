@@ -58,9 +58,9 @@ const CUTS: &str = "virtual lights, cuts of 16";
 const BIDIRECTIONAL: &str = "bidirectional paths";
 
 /// Side of pictures, pictures of each budget, samples per pixel of references.
-const WORK: [(u32, u32, u32); 2] = [(24, 5, 65_536), (8, 2, 256)];
+const WORK: [(u32, u32, u32); 2] = [(24, 16, 65_536), (8, 2, 256)];
 /// Samples per pixel; the same of a smoke run.
-const BUDGETS: [&[u32]; 2] = [&[16, 64, 256], &[1, 4]];
+const BUDGETS: [&[u32]; 2] = [&[4, 16, 64], &[1, 4]];
 /// The reference's seed; pictures have those after it.
 const SEED: u32 = 1;
 
