@@ -52,6 +52,29 @@ impl std::ops::AddAssign for GatherCounts {
     }
 }
 
+/// What rays through media took of the volume map, where that is counted ([`PhotonSettings::count_fetches`]): exact counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
+pub struct RayFetches {
+    /// Queries of rays behind the first bounce.
+    pub later_queries: u64,
+    /// Nodes of the map that were fetched, two at a time, once for all rays of a subgroup that go through it together.
+    pub nodes: u64,
+    /// Records, likewise.
+    pub records: u64,
+    /// Pairs of nodes, and records, that each ray has gone through.
+    pub tests: u64,
+}
+
+impl std::ops::AddAssign for RayFetches {
+    fn add_assign(&mut self, other: Self) {
+        self.later_queries += other.later_queries;
+        self.nodes += other.nodes;
+        self.records += other.records;
+        self.tests += other.tests;
+    }
+}
+
 /// Each point by itself, or those of a subgroup together.
 enum Query {
     Single(ComputePipeline<photon_gather::Kernel>),
@@ -129,6 +152,7 @@ impl Gather {
         let ask = AskSpec {
             has_path_automaton: eye.has_automaton(),
             counts_bounces: set.min_bounces() > least || set.max_bounces().is_some(),
+            of_rays: false,
         };
         let queue = Queue::new(gpu, scene, settings.queue, ask, slots)?;
         let nearest = settings.neighbors > 0;
@@ -256,6 +280,11 @@ impl Gather {
     pub fn volume_counts(&self) -> Result<GatherCounts> {
         self.beam.as_ref().map_or(Ok(GatherCounts::default()), Beam::counts)
     }
+
+    /// What its queries took, where that is counted.
+    pub fn volume_fetches(&self) -> Result<RayFetches> {
+        self.beam.as_ref().map_or(Ok(RayFetches::default()), Beam::fetches)
+    }
 }
 
 impl GatherStage<'_> {
@@ -303,7 +332,7 @@ impl ArrivalStage for GatherStage<'_> {
         let gather = self.gather;
         let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
         if let Some(beam) = &self.beam {
-            recorder.pass("photon: beams", |pass| beam.record(pass, self.scene, wave, places))?;
+            beam.record(recorder, self.scene, wave, places)?;
         }
         if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
             recorder.pass("photon: plane rays", |pass| {
@@ -311,7 +340,7 @@ impl ArrivalStage for GatherStage<'_> {
             })?;
         }
         let mut groups = places.items;
-        if !matches!(gather.queue, Queue::Slots) {
+        if gather.queue.collects() {
             recorder.pass("photon: gather queue", |pass| {
                 groups = gather
                     .queue

@@ -1,4 +1,4 @@
-//! Queues of the eye paths that ask the photon map: which places of a wave a query's invocations are for.
+//! Queues of the eye paths that ask a photon map, where they have arrived or on their way through media: which places of a wave a query's invocations are for.
 //!
 //! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1. Each place's sum is its own, so that the
 //! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
@@ -25,6 +25,8 @@ type Head = photon_queue_blocks::GatherQueueHead;
 pub(super) struct AskSpec {
     pub has_path_automaton: bool,
     pub counts_bounces: bool,
+    /// It is the rays that ask, as the stage before has found out.
+    pub of_rays: bool,
 }
 
 /// A queue with its memory.
@@ -71,6 +73,7 @@ impl Queue {
         let AskSpec {
             has_path_automaton,
             counts_bounces,
+            of_rays,
         } = spec;
         match queue {
             MapQueue::Slots => Ok(Self::Slots),
@@ -86,6 +89,7 @@ impl Queue {
                     has_media: scene.profile().media.any(),
                     has_path_automaton,
                     counts_bounces,
+                    of_rays,
                     ..Default::default()
                 });
                 Ok(Self::Compacted(Box::new(Compacted {
@@ -109,6 +113,7 @@ impl Queue {
                     has_media: scene.profile().media.any(),
                     has_path_automaton,
                     counts_bounces,
+                    of_rays,
                     ..Default::default()
                 });
                 // Only the last block of a team is partial, and its team had walked a block's places for it.
@@ -123,6 +128,11 @@ impl Queue {
                 })))
             }
         }
+    }
+
+    /// Whether something is to be recorded before queries.
+    pub fn collects(&self) -> bool {
+        !matches!(self, Self::Slots)
     }
 
     /// How shaders call it.
@@ -170,7 +180,7 @@ impl Queue {
         }
     }
 
-    /// Records what fills it from the places of a wave; where the arguments of its queries' dispatch are.
+    /// Records what fills it from the places of a wave; where the arguments of its queries' dispatch are. Rays ask whatever `ask` says.
     pub fn record<'a>(
         &'a self,
         pass: &mut Pass<'_>,
