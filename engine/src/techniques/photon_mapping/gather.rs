@@ -617,29 +617,62 @@ pub(crate) const ROWS: &[Row] = &[
         ..Row::of(file!())
     },
     Row {
+        id: "PM-ST-1",
+        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "No fused form of all stages stands beside it: it would need the sets of the wave, the ray index, the scene, the media and the map at once, of which Vulkan promises four; queries without a queue are fused with what finds their ways.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.4")],
+        shaders: &[
+            "shaders/walk/extend.comp",
+            "shaders/techniques/path/path_medium.comp",
+            "shaders/techniques/path/path_shade.comp",
+            "shaders/walk/shadow.comp",
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_gather.comp",
+        ],
+        tests: &[
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_of_rays_are_made_for_media_alone",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_are_the_same_in_parts",
+        ],
+        settings: &["queue", "query"],
+        ..Row::of(file!())
+    },
+    Row {
         id: "PM-ST-5",
-        name: "queries of the photon map, one per thread",
+        name: "queries of the photon maps, one per thread",
         role: Role::PartOf("PM-SYS-1"),
         limits: "Neighbouring threads walk different parts of the tree.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
-        shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_gather.comp",
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+        ],
         tests: &[
             "tests/tests/photon/determinism.rs::queries_that_a_quota_stops_go_through_all_records",
             "tests/tests/photon/flux.rs::the_picture_has_the_flux_of_the_map",
             "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
             "tests/tests/photon/determinism.rs::threads_never_show",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
         ],
         settings: &["query"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-ST-6",
-        name: "queries of the photon map, a subgroup's together",
+        name: "queries of the photon maps, a subgroup's together",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Off by default, since on the software driver it saves up to 16 % of the time of queries in closed rooms and costs up to 26 % elsewhere; needs subgroup votes; visits what any point of the subgroup asks for, and so meets the quota sooner, which with `neighbors` is an error.",
+        limits: "Off by default, since on the software driver it saves up to 16 % of the time of points' queries in closed rooms and costs up to 26 % elsewhere; needs subgroup votes; visits what any point or ray of the subgroup asks for, and so meets the quota sooner, which with `neighbors` is an error.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
-        shaders: &["shaders/techniques/photon_mapping/photon_gather_packet.comp"],
-        tests: &["tests/tests/photon/settings.rs::points_that_ask_together_see_the_same"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_gather_packet.comp",
+            "shaders/techniques/photon_mapping/photon_beam_packet.comp",
+        ],
+        tests: &[
+            "tests/tests/photon/settings.rs::points_that_ask_together_see_the_same",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_take_rays_that_all_meet_the_same_thousand_kernels",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_take_rays_that_a_quota_stops",
+        ],
         settings: &["query"],
         ..Row::of(file!())
     },

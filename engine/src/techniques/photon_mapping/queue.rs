@@ -244,13 +244,17 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-ST-2",
         name: "queue of queries, type I: an invocation per place of the wave",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Places that ask nothing idle.",
+        limits: "Places that ask nothing idle; rays find their ways in the kernel of their queries.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
-        shaders: &["shaders/techniques/photon_mapping/photon_queue.glsl"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_queue.glsl",
+            "shaders/techniques/photon_mapping/photon_queued_place.glsl",
+        ],
         tests: &[
             "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
             "tests/tests/photon/queues.rs::queues_take_places_that_all_lie_in_the_same_thousand_kernels",
             "tests/tests/photon/queues.rs::nothing_is_asked_behind_the_end_of_a_queue",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
         ],
         settings: &["queue"],
         ..Row::of(file!())
@@ -259,12 +263,19 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-ST-3",
         name: "queue of queries, type II: places that ask, by stream compaction",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Costs passes over all places before each query.",
+        limits: "Costs passes over all places before each query, for rays one more, which finds their ways.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
-        shaders: &["shaders/techniques/photon_mapping/photon_queue_flags.comp"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_queue_flags.comp",
+            "shaders/techniques/photon_mapping/photon_queue_asks.glsl",
+            "shaders/techniques/photon_mapping/photon_beam_ways.comp",
+        ],
         tests: &[
             "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
             "tests/tests/photon/queues.rs::queues_may_stay_empty",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_go_through_grids",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_wait_for_walks_through_grids",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_are_the_same_in_parts",
         ],
         settings: &["queue"],
         ..Row::of(file!())
@@ -275,11 +286,18 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("PM-SYS-1"),
         limits: "Those who collect wait for each other, a workgroup at a time; blocks may be partial and come in any order, which no picture shows.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
-        shaders: &["shaders/techniques/photon_mapping/photon_queue_blocks.comp"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_queue_blocks.comp",
+            "shaders/techniques/photon_mapping/photon_queue_asks.glsl",
+            "shaders/techniques/photon_mapping/photon_beam_ways.comp",
+        ],
         tests: &[
             "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
             "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
             "tests/tests/photon/queues.rs::blocks_need_no_subgroup_operations",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_see_planes_and_beams",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_never_show_on_any_number_of_threads",
         ],
         settings: &["queue"],
         ..Row::of(file!())
