@@ -294,9 +294,8 @@ fn queues_and_packets_of_rays_are_made_for_media_alone() {
             let settings = PhotonSettings {
                 queue,
                 query,
-                photons: 1 << 8,
-                volume_radius: 0.1,
-                ..settings("all")
+                samples_per_pass: 1,
+                ..asked(1 << 8, 0.1)
             };
             let mut mapper = mapper(gpu, scene, &settings);
             let mut passes = Vec::new();
