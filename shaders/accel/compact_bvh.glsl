@@ -5,7 +5,8 @@
 //   bool compact_visit_point(uint record);                 for each leaf with its first record, and with the one behind it as long as it
 //                                                          returns true, if COMPACT_POINT is defined
 //   float compact_visit_ray(uint first, float t_max);      the same, returning the ray's end, if COMPACT_RAY is defined
-//   bool compact_visit_beam(uint record);                  as for points, if COMPACT_BEAM is defined: rays that meet all on their way, and end nowhere
+//   bool compact_visit_beam(uint record);                  as for points, if COMPACT_BEAM is defined: rays that meet all on their way, and end nowhere.
+//                                                          Records count where compact_mine says so
 // Loops take at most COMPACT_QUOTA steps, each a node or a record; a query that they stop returns false.
 #ifndef CLERESTORY_ACCEL_COMPACT_BVH_GLSL
 #define CLERESTORY_ACCEL_COMPACT_BVH_GLSL
@@ -35,20 +36,21 @@ uvec2 compact_counters = uvec2(0u);
 #if defined(COMPACT_POINT) || defined(COMPACT_BEAM)
 // Nodes and records of the invocation's queries so far.
 uint compact_steps = 0u;
+
+// With COMPACT_PACKET defined, by includers with the extension for subgroup votes, the points or rays of a subgroup go through the tree together:
+// each child that any of them lies in or meets is visited by all.
+#ifdef COMPACT_PACKET
+#define COMPACT_ANY(MEETS) subgroupAny(MEETS)
+#else
+#define COMPACT_ANY(MEETS) (MEETS)
+#endif
 #endif
 
 // Bits of the three components, x highest.
 uint compact_bits(bvec3 v) { return uint(v.x) << 2 | uint(v.y) << 1 | uint(v.z); }
 
 #ifdef COMPACT_POINT
-// With COMPACT_PACKET defined, by includers with the extension for subgroup votes, the points of a subgroup go through the tree together:
-// each child that holds any of them is visited by all. A pair says where a point lies only for points in its parent's box, so that each
-// invocation remembers whether its own is there.
-#ifdef COMPACT_PACKET
-#define COMPACT_ANY(MEETS) subgroupAny(MEETS)
-#else
-#define COMPACT_ANY(MEETS) (MEETS)
-#endif
+// A pair says where a point lies only for points in its parent's box, so that with COMPACT_PACKET each invocation remembers whether its own is there.
 
 // Includers whose queries reach less far than the boxes allow for move the boxes' planes inwards, all by one distance.
 #ifndef COMPACT_LOWER
@@ -176,11 +178,31 @@ bool compact_ray_query(CompactRoot root, Ray ray) {
 #endif
 
 #ifdef COMPACT_BEAM
-// One loop, whose step is a node or a record, as in a point's query.
+// Whether the invocation's own ray meets the leaf under visit: with COMPACT_PACKET it may be one that only others meet.
+#ifdef COMPACT_PACKET
+bool compact_mine;
+#else
+const bool compact_mine = true;
+#endif
+
+// Whether the invocation counts what all that go through the tree with it fetch at once. Includers with COMPACT_PACKET that count say which one does.
+#ifndef COMPACT_LEADS
+#define COMPACT_LEADS true
+#endif
+// Records fetched, beside compact_counters.
+uint compact_records = 0u;
+
+// Within no box, nor any in it.
+const vec2 COMPACT_NO_SPAN = vec2(1.0, -1.0);
+
+// One loop, whose step is a node or a record, as in a point's query. With COMPACT_PACKET a ray that does not meet a box has no span there, and so meets nothing within; all
+// meet their leaves in the same order as by themselves.
 bool compact_beam_query(CompactRoot root, Ray ray) {
     BoxTest boxes = box_test(root.lower, root.upper, ray);
     vec2 span = compact_span_within(boxes, root.lower, root.upper, vec2(ray.t_min, ray.t_max));
-    uint next = is_traceable(ray) && compact_met(span) ? root.reference : COMPACT_NOTHING;
+    bool meets = is_traceable(ray) && compact_met(span);
+    span = meets ? span : COMPACT_NO_SPAN;
+    uint next = COMPACT_ANY(meets) ? root.reference : COMPACT_NOTHING;
     uint stack[COMPACT_STACK_SIZE];
     vec2 spans[COMPACT_STACK_SIZE];
     uint top = 0u;
@@ -188,6 +210,10 @@ bool compact_beam_query(CompactRoot root, Ray ray) {
     for (; next != COMPACT_NOTHING && step < COMPACT_QUOTA; ++step) {
         bool pop = true;
         if ((next & COMPACT_LEAF_BIT) != 0u) {
+#ifdef COMPACT_PACKET
+            compact_mine = compact_met(span);
+#endif
+            compact_records += COMPACT_LEADS ? 1u : 0u;
             pop = !compact_visit_beam(next ^ COMPACT_LEAF_BIT);
             ++next;
         } else {
@@ -196,9 +222,9 @@ bool compact_beam_query(CompactRoot root, Ray ray) {
             vec2 left;
             vec2 right;
             compact_spans(boxes, low, high, span, left, right);
-            bool met_left = compact_met(left);
-            bool met_right = compact_met(right);
-            compact_counters.x += 2u;
+            bool met_left = COMPACT_ANY(compact_met(left));
+            bool met_right = COMPACT_ANY(compact_met(right));
+            compact_counters.x += COMPACT_LEADS ? 2u : 0u;
             if (met_left && met_right) {
                 stack[top] = low.w & COMPACT_REFERENCE_MASK;
                 spans[top++] = left;

@@ -14,6 +14,8 @@ const uint BEAM_STOPPED_GATHER_STOPPED = 0xFFFFFFF8u;
 const uint BEAM_WALKING = 0xFFFFFFF7u;
 // The beam is done but for the ray that tells whether the planes it has met are seen.
 const uint BEAM_TRACING = 0xFFFFFFF6u;
+// The way of the beam is known, and its query waits in a queue.
+const uint BEAM_ASKS = 0xFFFFFFF5u;
 
 // Whether all light of the beam is there, or will be once it goes through all records: nothing else is added before.
 bool beam_is_known(uint resume) { return resume == BEAM_DONE || resume == BEAM_STOPPED; }
@@ -21,10 +23,11 @@ bool beam_has_stopped(uint resume) {
     return resume == BEAM_STOPPED || resume == BEAM_STOPPED_GATHER_DONE || resume == BEAM_STOPPED_GATHER_STOPPED;
 }
 bool gather_has_stopped(uint resume) { return resume == GATHER_STOPPED || resume == BEAM_STOPPED_GATHER_STOPPED; }
-// Whether the beam of a place has been asked for, whatever has become of it.
+// Whether the beam of a place has been asked for, whatever has become of it; and whether its way is known, or has none that asks.
 bool beam_was_asked(uint resume) {
     return beam_is_known(resume) || beam_has_stopped(resume) || resume == GATHER_DONE || resume == GATHER_STOPPED || resume == BEAM_TRACING;
 }
+bool beam_was_begun(uint resume) { return beam_was_asked(resume) || resume == BEAM_ASKS; }
 
 // What stands there for a point's query that is done, or stopped, by what stood there for the beam.
 uint gather_done(uint resume) { return resume == BEAM_STOPPED ? BEAM_STOPPED_GATHER_DONE : GATHER_DONE; }

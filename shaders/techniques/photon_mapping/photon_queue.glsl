@@ -1,4 +1,4 @@
-// The queue of eye paths that ask the photon map (descriptor set 3), of one of three types.
+// The queue of eye paths that ask a photon map, of surfaces or of media (descriptor set 3), of one of three types.
 //
 // QUEUE_SLOTS: an invocation per place of the wave; those that ask nothing idle. QUEUE_COMPACTED: flags by place and a stable compaction.
 // QUEUE_BLOCKS: teams as wide as subgroups collect places in shared memory and append whole blocks of as many to a list. A block number is all that
@@ -11,14 +11,6 @@
 
 // descriptor set 3: GatherQueue
 
-const uint QUEUE_SLOTS = 0u;
-const uint QUEUE_COMPACTED = 1u;
-const uint QUEUE_BLOCKS = 2u;
-// Blocks that a team collects before it appends them.
-const uint QUEUE_BUFFER_BLOCKS = 7u;
-
-const uint NO_PLACE = 0xFFFFFFFFu;
-
 layout(set = 3, binding = 0, scalar) restrict buffer GatherQueueHead {
     uint groups[3];   // indirect arguments of queries
     uint count;       // places, or blocks of them
@@ -29,14 +21,6 @@ layout(set = 3, binding = 2, scalar) restrict buffer GatherFlags { uint gather_f
 layout(set = 3, binding = 3, scalar) restrict buffer GatherBlocks { uint gather_blocks[]; };  // places of each block
 layout(set = 3, binding = 4, scalar) restrict buffer GatherFlagCount { uint gather_flag_count[]; };  // one word: places with a flag, 0 or 1
 
-// The place of an invocation's query, or NO_PLACE.
-uint queued_place(uint queue, uint index) {
-    if (queue == QUEUE_COMPACTED) {
-        return index < gather_head.count ? gather_places[index] : NO_PLACE;
-    }
-    uint size = gather_head.block_size;
-    uint block = index / size;
-    return block < gather_head.count && index % size < gather_blocks[block] ? gather_places[index] : NO_PLACE;
-}
+#include "techniques/photon_mapping/photon_queued_place.glsl"
 
 #endif

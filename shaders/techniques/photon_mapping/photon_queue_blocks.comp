@@ -1,5 +1,5 @@
 #version 460
-// The queue of queries in blocks: teams, as many invocations as a block has places, walk COMPACT_CHUNK places each, collect those that ask the photon
+// The queue of queries in blocks: teams, as many invocations as a block has places, walk COMPACT_CHUNK places each, collect those that ask a photon
 // map in shared memory and append them to the list of blocks whenever less than a block of room is left; at its end the last block of a team may be
 // partial. No workgroup waits for another. What is in a block follows from the places alone, its number from who came first.
 //
@@ -10,8 +10,8 @@
 
 layout(local_size_x = 64) in;
 
-#include "techniques/photon_mapping/photon_asks.glsl"
 #include "techniques/photon_mapping/photon_queue.glsl"
+#include "techniques/photon_mapping/photon_queue_asks.glsl"
 
 layout(constant_id = 47) const uint QUEUE_WIDTH = 32u;  // places of a block, lanes of a team: a divisor of WALK_GROUP
 
@@ -52,11 +52,7 @@ void main() {
     uint held = 0u;
     for (uint tile = 0u; tile < tiles; ++tile) {
         uint place = team_begin + tile * QUEUE_WIDTH + lane;
-        bool asks = false;
-        if (place < count) {
-            Arrival arrival;
-            asks = asks_map(push.ask, load_walk(load_slot(place)), place, arrival);
-        }
+        bool asks = place < count && asks_at(push.ask, place);
         asking[gl_LocalInvocationID.x] = asks ? 1u : 0u;
         barrier();
         uint before = 0u;

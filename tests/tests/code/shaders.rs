@@ -105,6 +105,7 @@ const WITH_SUBGROUP_OPERATIONS: &[(&str, &str)] = &[
     ("kernels/radix_scatter_subgroup.comp", BY_WHOLE_WORKGROUPS),
     ("kernels/scan_apply_subgroup.comp", BY_WHOLE_WORKGROUPS),
     ("kernels/scan_reduce_subgroup.comp", BY_WHOLE_WORKGROUPS),
+    ("techniques/photon_mapping/photon_beam_packet.comp", WITH_ANY_COMPANY),
     ("techniques/photon_mapping/photon_gather_packet.comp", WITH_ANY_COMPANY),
 ];
 

@@ -25,6 +25,7 @@ mod traps;
 mod unified;
 mod volume;
 mod volume_kernels;
+mod volume_queues;
 mod volume_truths;
 
 use std::f64::consts::PI;

@@ -13,7 +13,7 @@ const CHILD: &str = "CLERESTORY_TEST_PRINT_QUEUE_HASH";
 const CHILD_TEST: &str = "queues::prints_its_hash_when_asked";
 
 /// Queues and queries, the plainest first.
-const FORMS: [(MapQueue, MapQuery); 6] = [
+pub(super) const FORMS: [(MapQueue, MapQuery); 6] = [
     (MapQueue::Slots, MapQuery::Single),
     (MapQueue::Compacted, MapQuery::Single),
     (MapQueue::Blocks, MapQuery::Single),

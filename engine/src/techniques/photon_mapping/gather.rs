@@ -52,6 +52,29 @@ impl std::ops::AddAssign for GatherCounts {
     }
 }
 
+/// What rays through media took of the volume map, where that is counted ([`PhotonSettings::count_fetches`]): exact counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[non_exhaustive]
+pub struct RayFetches {
+    /// Queries of rays behind the first bounce.
+    pub later_queries: u64,
+    /// Nodes of the map that were fetched, two at a time, once for all rays of a subgroup that go through it together.
+    pub nodes: u64,
+    /// Records, likewise.
+    pub records: u64,
+    /// Pairs of nodes, and records, that each ray has gone through.
+    pub tests: u64,
+}
+
+impl std::ops::AddAssign for RayFetches {
+    fn add_assign(&mut self, other: Self) {
+        self.later_queries += other.later_queries;
+        self.nodes += other.nodes;
+        self.records += other.records;
+        self.tests += other.tests;
+    }
+}
+
 /// Each point by itself, or those of a subgroup together.
 enum Query {
     Single(ComputePipeline<photon_gather::Kernel>),
@@ -129,6 +152,7 @@ impl Gather {
         let ask = AskSpec {
             has_path_automaton: eye.has_automaton(),
             counts_bounces: set.min_bounces() > least || set.max_bounces().is_some(),
+            of_rays: false,
         };
         let queue = Queue::new(gpu, scene, settings.queue, ask, slots)?;
         let nearest = settings.neighbors > 0;
@@ -256,6 +280,11 @@ impl Gather {
     pub fn volume_counts(&self) -> Result<GatherCounts> {
         self.beam.as_ref().map_or(Ok(GatherCounts::default()), Beam::counts)
     }
+
+    /// What its queries took, where that is counted.
+    pub fn volume_fetches(&self) -> Result<RayFetches> {
+        self.beam.as_ref().map_or(Ok(RayFetches::default()), Beam::fetches)
+    }
 }
 
 impl GatherStage<'_> {
@@ -303,7 +332,7 @@ impl ArrivalStage for GatherStage<'_> {
         let gather = self.gather;
         let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
         if let Some(beam) = &self.beam {
-            recorder.pass("photon: beams", |pass| beam.record(pass, self.scene, wave, places))?;
+            beam.record(recorder, self.scene, wave, places)?;
         }
         if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
             recorder.pass("photon: plane rays", |pass| {
@@ -311,7 +340,7 @@ impl ArrivalStage for GatherStage<'_> {
             })?;
         }
         let mut groups = places.items;
-        if !matches!(gather.queue, Queue::Slots) {
+        if gather.queue.collects() {
             recorder.pass("photon: gather queue", |pass| {
                 groups = gather
                     .queue
@@ -588,29 +617,62 @@ pub(crate) const ROWS: &[Row] = &[
         ..Row::of(file!())
     },
     Row {
+        id: "PM-ST-1",
+        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "No fused form of all stages stands beside it: it would need the sets of the wave, the ray index, the scene, the media and the map at once, of which Vulkan promises four; queries without a queue are fused with what finds their ways.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.4")],
+        shaders: &[
+            "shaders/walk/extend.comp",
+            "shaders/techniques/path/path_medium.comp",
+            "shaders/techniques/path/path_shade.comp",
+            "shaders/walk/shadow.comp",
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_gather.comp",
+        ],
+        tests: &[
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_of_rays_are_made_for_media_alone",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_are_the_same_in_parts",
+        ],
+        settings: &["queue", "query"],
+        ..Row::of(file!())
+    },
+    Row {
         id: "PM-ST-5",
-        name: "queries of the photon map, one per thread",
+        name: "queries of the photon maps, one per thread",
         role: Role::PartOf("PM-SYS-1"),
         limits: "Neighbouring threads walk different parts of the tree.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
-        shaders: &["shaders/techniques/photon_mapping/photon_gather.comp"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_gather.comp",
+            "shaders/techniques/photon_mapping/photon_beam.comp",
+        ],
         tests: &[
             "tests/tests/photon/determinism.rs::queries_that_a_quota_stops_go_through_all_records",
             "tests/tests/photon/flux.rs::the_picture_has_the_flux_of_the_map",
             "tests/tests/photon/settings.rs::direct_photons_and_final_gather_have_the_same_light",
             "tests/tests/photon/determinism.rs::threads_never_show",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
         ],
         settings: &["query"],
         ..Row::of(file!())
     },
     Row {
         id: "PM-ST-6",
-        name: "queries of the photon map, a subgroup's together",
+        name: "queries of the photon maps, a subgroup's together",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Off by default, since on the software driver it saves up to 16 % of the time of queries in closed rooms and costs up to 26 % elsewhere; needs subgroup votes; visits what any point of the subgroup asks for, and so meets the quota sooner, which with `neighbors` is an error.",
+        limits: "Off by default, since on the software driver it saves up to 16 % of the time of points' queries in closed rooms and costs up to 26 % elsewhere; needs subgroup votes; visits what any point or ray of the subgroup asks for, and so meets the quota sooner, which with `neighbors` is an error.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.2")],
-        shaders: &["shaders/techniques/photon_mapping/photon_gather_packet.comp"],
-        tests: &["tests/tests/photon/settings.rs::points_that_ask_together_see_the_same"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_gather_packet.comp",
+            "shaders/techniques/photon_mapping/photon_beam_packet.comp",
+        ],
+        tests: &[
+            "tests/tests/photon/settings.rs::points_that_ask_together_see_the_same",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_take_rays_that_all_meet_the_same_thousand_kernels",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_take_rays_that_a_quota_stops",
+        ],
         settings: &["query"],
         ..Row::of(file!())
     },

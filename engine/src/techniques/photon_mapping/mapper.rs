@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::card::refusals;
-use super::gather::{EventsAsked, Gather, GatherCounts};
+use super::gather::{EventsAsked, Gather, GatherCounts, RayFetches};
 use super::kernel::{KernelSettings, PhotonRecord, PhotonWords, photon_history, unpack_photon};
 use super::map::{Made, MapContents, MapFigures, MapMaker, PhotonMap, seconds_of};
 use super::pilot;
@@ -63,6 +63,8 @@ pub struct MapperCounts {
     pub gather: GatherCounts,
     /// Ways through media that asked the maps of these, and the kernels that they met.
     pub beams: GatherCounts,
+    /// What these took of the maps, where that is counted.
+    pub ray_fetches: RayFetches,
     /// Seconds of wall clock that photons were traced for.
     pub trace_seconds: f64,
     /// Seconds that maps were built for: by the host those of wall clock, with copies; by the device those of wall clock until a build was
@@ -385,6 +387,7 @@ impl PhotonMapper {
             if step.is_some() && !self.eye.is_within_wave() {
                 self.counts.gather += photons.gather.counts()?;
                 self.counts.beams += photons.gather.volume_counts()?;
+                self.counts.ray_fetches += photons.gather.volume_fetches()?;
             }
         }
         let Some(mut step) = step else {

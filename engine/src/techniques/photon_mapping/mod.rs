@@ -16,7 +16,7 @@ mod tracer;
 pub mod volume;
 
 pub(super) use card::CARD;
-pub use gather::GatherCounts;
+pub use gather::{GatherCounts, RayFetches};
 pub use map::{MapContents, map_contents};
 pub use mapper::{MappedEvent, MappedPhoton, MapperCounts, PhotonMapper};
 pub use settings::{MapBuild, MapQuery, MapQueue, PhotonSettings};

@@ -1,4 +1,4 @@
-//! Queues of the eye paths that ask the photon map: which places of a wave a query's invocations are for.
+//! Queues of the eye paths that ask a photon map, where they have arrived or on their way through media: which places of a wave a query's invocations are for.
 //!
 //! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1. Each place's sum is its own, so that the
 //! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
@@ -25,6 +25,8 @@ type Head = photon_queue_blocks::GatherQueueHead;
 pub(super) struct AskSpec {
     pub has_path_automaton: bool,
     pub counts_bounces: bool,
+    /// It is the rays that ask, as the stage before has found out.
+    pub of_rays: bool,
 }
 
 /// A queue with its memory.
@@ -71,6 +73,7 @@ impl Queue {
         let AskSpec {
             has_path_automaton,
             counts_bounces,
+            of_rays,
         } = spec;
         match queue {
             MapQueue::Slots => Ok(Self::Slots),
@@ -86,6 +89,7 @@ impl Queue {
                     has_media: scene.profile().media.any(),
                     has_path_automaton,
                     counts_bounces,
+                    of_rays,
                     ..Default::default()
                 });
                 Ok(Self::Compacted(Box::new(Compacted {
@@ -109,6 +113,7 @@ impl Queue {
                     has_media: scene.profile().media.any(),
                     has_path_automaton,
                     counts_bounces,
+                    of_rays,
                     ..Default::default()
                 });
                 // Only the last block of a team is partial, and its team had walked a block's places for it.
@@ -123,6 +128,11 @@ impl Queue {
                 })))
             }
         }
+    }
+
+    /// Whether something is to be recorded before queries.
+    pub fn collects(&self) -> bool {
+        !matches!(self, Self::Slots)
     }
 
     /// How shaders call it.
@@ -170,7 +180,7 @@ impl Queue {
         }
     }
 
-    /// Records what fills it from the places of a wave; where the arguments of its queries' dispatch are.
+    /// Records what fills it from the places of a wave; where the arguments of its queries' dispatch are. Rays ask whatever `ask` says.
     pub fn record<'a>(
         &'a self,
         pass: &mut Pass<'_>,
@@ -234,13 +244,17 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-ST-2",
         name: "queue of queries, type I: an invocation per place of the wave",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Places that ask nothing idle.",
+        limits: "Places that ask nothing idle; rays find their ways in the kernel of their queries.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
-        shaders: &["shaders/techniques/photon_mapping/photon_queue.glsl"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_queue.glsl",
+            "shaders/techniques/photon_mapping/photon_queued_place.glsl",
+        ],
         tests: &[
             "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
             "tests/tests/photon/queues.rs::queues_take_places_that_all_lie_in_the_same_thousand_kernels",
             "tests/tests/photon/queues.rs::nothing_is_asked_behind_the_end_of_a_queue",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
         ],
         settings: &["queue"],
         ..Row::of(file!())
@@ -249,12 +263,19 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-ST-3",
         name: "queue of queries, type II: places that ask, by stream compaction",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Costs passes over all places before each query.",
+        limits: "Costs passes over all places before each query, for rays one more, which finds their ways.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
-        shaders: &["shaders/techniques/photon_mapping/photon_queue_flags.comp"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_queue_flags.comp",
+            "shaders/techniques/photon_mapping/photon_queue_asks.glsl",
+            "shaders/techniques/photon_mapping/photon_beam_ways.comp",
+        ],
         tests: &[
             "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
             "tests/tests/photon/queues.rs::queues_may_stay_empty",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_go_through_grids",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_wait_for_walks_through_grids",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_are_the_same_in_parts",
         ],
         settings: &["queue"],
         ..Row::of(file!())
@@ -265,11 +286,18 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("PM-SYS-1"),
         limits: "Those who collect wait for each other, a workgroup at a time; blocks may be partial and come in any order, which no picture shows.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4.1")],
-        shaders: &["shaders/techniques/photon_mapping/photon_queue_blocks.comp"],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_queue_blocks.comp",
+            "shaders/techniques/photon_mapping/photon_queue_asks.glsl",
+            "shaders/techniques/photon_mapping/photon_beam_ways.comp",
+        ],
         tests: &[
             "tests/tests/photon/queues.rs::every_queue_gives_the_same_picture",
             "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
             "tests/tests/photon/queues.rs::blocks_need_no_subgroup_operations",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_see_planes_and_beams",
+            "tests/tests/photon/volume_queues.rs::queues_and_packets_never_show_on_any_number_of_threads",
         ],
         settings: &["queue"],
         ..Row::of(file!())

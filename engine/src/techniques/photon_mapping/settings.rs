@@ -51,7 +51,7 @@ impl MediaLengths {
     }
 }
 
-/// How points are looked up in the map.
+/// How points, and rays through media, are looked up in their maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapQuery {
@@ -148,13 +148,13 @@ crate::settings! {
         pub direct_photons: bool = false;
         /// Sees the map after one more diffuse reflection, caustics directly; cannot be combined with direct_photons.
         pub final_gather: bool = false;
-        /// Points query the map one by one, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, the last
+        /// Points, and rays through media, query their maps one by one, or those of a subgroup together, which needs subgroup votes; where a query's quota stops it, the last
         /// bits may differ.
         ///
         /// With neighbours, where a quota is an error, points that ask together meet it sooner. Packets are no default since they often lose
-        /// (experiment `photon-queues`).
+        /// (experiments `photon-queues` and `volume-queues`).
         pub query: MapQuery = MapQuery::Single;
-        /// Invocations of queries serve every path under way, or only those that query the map, found by stream compaction or in blocks that
+        /// Invocations of queries serve every path under way, or only those that query the map in question, found by stream compaction or in blocks that
         /// subgroups collect; changes pictures only as query does.
         pub queue: MapQueue = MapQueue::Slots;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
@@ -173,6 +173,9 @@ crate::settings! {
         /// Nodes and records after which a query of the map is given up and its place goes through all records instead, which changes the order
         /// of sums only; with neighbours the area that is searched is halved instead, and they may be fewer.
         pub query_quota: u32 = QUERY_QUOTA, in 1..=QUERY_QUOTA;
+        /// Counts what rays through media fetch of the map ([`MapperCounts::ray_fetches`](super::MapperCounts::ray_fetches)), by other kernels. Never changes the picture: for
+        /// measuring.
+        pub count_fetches: bool = false;
         /// Work of photons, of eye paths and of queries, in loop iterations, after which a submission begins no further place, as
         /// [`WalkOptions::work`](crate::walk::WalkOptions::work); 0 chooses by the kind of device. Never changes the picture.
         pub submission_work: u64 = 0;

@@ -1,18 +1,25 @@
 //! What eye paths see of a volume map along their ways through media: the first part of the stage between arrival and scattering, in scenes with media.
+//!
+//! Rays ask by themselves or a subgroup's together, at every place of a wave or from a queue of those that do (B. Fabianowski, "Interactive Manycore Photon
+//! Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4): each one's sum has the order of the map's leaves, and the same bits.
 
 use std::sync::OnceLock;
 
 use super::VolumeEstimate;
 use super::map::EventMap;
 use super::plane_rays::PlaneRays;
-use crate::gpu::shaders::constants::{LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS};
-use crate::gpu::shaders::sets::WaveSet;
-use crate::gpu::shaders::techniques::photon_mapping::photon_beam;
-use crate::gpu::shaders::types::BeamWay;
-use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, wide_counter};
-use crate::techniques::photon_mapping::gather::GatherCounts;
+use crate::gpu::interface::BindingSet;
+use crate::gpu::shaders::constants::{LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS, QUEUE_SLOTS};
+use crate::gpu::shaders::sets::{PhotonBeamSet, WaveSet};
+use crate::gpu::shaders::techniques::photon_mapping::{photon_beam, photon_beam_packet, photon_beam_ways};
+use crate::gpu::shaders::types::{AskSettings, BeamWay};
+use crate::gpu::{
+    Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, wide_counter,
+};
+use crate::techniques::photon_mapping::gather::{GatherCounts, RayFetches};
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
-use crate::techniques::photon_mapping::settings::PhotonSettings;
+use crate::techniques::photon_mapping::queue::{AskSpec, Queue};
+use crate::techniques::photon_mapping::settings::{MapQuery, PhotonSettings};
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::{Places, WalkKey, stage_barrier};
 use crate::{Error, Result};
@@ -22,10 +29,19 @@ const BEAM_QUOTA: u32 = 32_768;
 
 type Counters = photon_beam::BeamCounters;
 
-/// The kernel, with what it keeps of ways.
+/// Each ray by itself, or those of a subgroup together.
+enum Query {
+    Single(ComputePipeline<photon_beam::Kernel>),
+    Packet(ComputePipeline<photon_beam_packet::Kernel>),
+}
+
+/// The kernels, with what they keep of ways.
 pub(in crate::techniques::photon_mapping) struct Beam {
     gpu: Gpu,
-    kernel: ComputePipeline<photon_beam::Kernel>,
+    query: Query,
+    queue: Queue,
+    /// Finds the ways before the queue is filled; without one queries do.
+    finds: Option<ComputePipeline<photon_beam_ways::Kernel>>,
     /// For places that a quota stopped: made when it is first needed.
     linear: (Box<photon_beam::Spec>, OnceLock<ComputePipeline<photon_beam::Kernel>>),
     ways: Buffer,
@@ -85,22 +101,49 @@ impl Beam {
             counts_bounces,
         } = asking;
         let profile = scene.profile();
-        let spec = |linear| photon_beam::Spec {
+        let queue = AskSpec {
+            has_path_automaton: eye.has_automaton(),
+            counts_bounces,
+            of_rays: true,
+        };
+        let queue = Queue::new(gpu, scene, settings.queue, queue, slots)?;
+        // Both entry points have the same constants.
+        macro_rules! spec {
+            ($shader:ident, $queue:expr, $linear:expr) => {
+                $shader::Spec {
+                    has_absorption: profile.has_absorption,
+                    has_instances: profile.keeps_instances,
+                    has_path_automaton: eye.has_automaton(),
+                    has_grids: profile.media.heterogeneous,
+                    has_homogeneous: profile.media.homogeneous,
+                    sampler_kind: settings.sampler as u32,
+                    profile: settings.profile as u32,
+                    marches: settings.volume == VolumeEstimate::March,
+                    beams: settings.volume.stores_ways(),
+                    planes: settings.volume.stores_planes(),
+                    points: settings.volume.stores_points(),
+                    compact_quota: settings.query_quota.min(BEAM_QUOTA),
+                    count_fetches: settings.count_fetches,
+                    counts_bounces,
+                    has_classes: classes.is_some(),
+                    queue: $queue,
+                    linear: $linear,
+                    ..Default::default()
+                }
+            };
+        }
+        let query = match settings.query {
+            MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_beam, queue.kind(), false))?),
+            MapQuery::Packet => Query::Packet(gpu.compute_pipeline(&spec!(photon_beam_packet, queue.kind(), false))?),
+        };
+        let finds = photon_beam_ways::Spec {
             has_absorption: profile.has_absorption,
             has_instances: profile.keeps_instances,
             has_path_automaton: eye.has_automaton(),
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             sampler_kind: settings.sampler as u32,
-            profile: settings.profile as u32,
-            marches: settings.volume == VolumeEstimate::March,
-            beams: settings.volume.stores_ways(),
-            planes: settings.volume.stores_planes(),
-            points: settings.volume.stores_points(),
-            compact_quota: settings.query_quota.min(BEAM_QUOTA),
-            counts_bounces,
             has_classes: classes.is_some(),
-            linear,
             ..Default::default()
         };
         let asked = if profile.media.heterogeneous { slots } else { 1 };
@@ -119,8 +162,13 @@ impl Beam {
         };
         Ok(Self {
             gpu: gpu.clone(),
-            kernel: gpu.compute_pipeline(&spec(false))?,
-            linear: (Box::new(spec(true)), OnceLock::new()),
+            query,
+            finds: queue
+                .collects()
+                .then(|| gpu.compute_pipeline::<photon_beam_ways::Kernel>(&finds))
+                .transpose()?,
+            queue,
+            linear: (Box::new(spec!(photon_beam, QUEUE_SLOTS, true)), OnceLock::new()),
             ways: work("beam ways", size_of::<BeamWay>(), slots)?,
             asked: work("beam asked", size_of::<f32>(), asked)?,
             planes: settings
@@ -141,8 +189,14 @@ impl Beam {
     }
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        let planes = self.planes.iter().map(PlaneRays::pipeline);
-        std::iter::once(self.kernel.info()).chain(planes).collect()
+        let mut all: Vec<PipelineInfo> = self.finds.iter().map(ComputePipeline::info).collect();
+        all.extend(self.queue.pipelines());
+        all.push(match &self.query {
+            Query::Single(kernel) => kernel.info(),
+            Query::Packet(kernel) => kernel.info(),
+        });
+        all.extend(self.planes.iter().map(PlaneRays::pipeline));
+        all
     }
 
     /// What is left of light from the surfaces that paths have met, by place.
@@ -159,22 +213,39 @@ impl Beam {
             rays: self.planes.as_ref().map_or(Ok(0), PlaneRays::count)?,
         })
     }
+
+    /// What the queries of the last wave took, where that is counted.
+    pub fn fetches(&self) -> Result<RayFetches> {
+        let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
+        Ok(RayFetches {
+            later_queries: u64::from(counters.later),
+            nodes: wide_counter(counters.nodes),
+            records: wide_counter(counters.records),
+            tests: wide_counter(counters.tests),
+        })
+    }
 }
 
 impl BeamStage<'_> {
-    fn set(&self) -> photon_beam::Set1<'_> {
-        photon_beam::Set1 {
+    fn set(&self) -> PhotonBeamSet<'_> {
+        let Beam {
+            queue,
+            counters,
+            planes,
+            ..
+        } = self.beam;
+        let queue = queue.set(counters);
+        PhotonBeamSet {
             event_pairs: &self.map.pairs,
             event_records: &self.map.events,
             photon_event_root: self.map.root.view(),
-            beam_counters: self.beam.counters.view(),
+            beam_counters: counters.view(),
             photon_beam_ways: self.beam.ways.view(),
             photon_beam_asked: self.beam.asked.view(),
-            photon_plane_rays: self
-                .beam
-                .planes
-                .as_ref()
-                .map_or(self.beam.counters.view(), PlaneRays::rays),
+            photon_plane_rays: planes.as_ref().map_or(counters.view(), PlaneRays::rays),
+            gather_head: queue.gather_head,
+            beam_places: queue.gather_places,
+            beam_blocks: queue.gather_blocks,
         }
     }
 
@@ -206,13 +277,39 @@ impl BeamStage<'_> {
         pass.copy(self.beam.counters.view(), self.beam.counters_readback.view())
     }
 
-    /// Records queries at all places that have none yet.
-    pub fn record(&self, pass: &mut Pass<'_>, scene: &GpuScene, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+    /// Records queries at all places that have none yet, behind what finds and collects those that ask.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        places: Places<'_>,
+    ) -> Result<()> {
         let (set, of_scene, media) = (self.set(), scene.scene_set(), scene.media_set());
-        let push = self.push(scene, places.key);
-        pass.dispatch_indirect(&self.beam.kernel, &[wave, &set, &of_scene, &media], &push, places.items)?;
-        stage_barrier(pass);
-        Ok(())
+        let (sets, push): ([&dyn BindingSet<'_>; 4], _) =
+            ([wave, &set, &of_scene, &media], self.push(scene, places.key));
+        let mut groups = places.items;
+        if let Some(finds) = &self.beam.finds {
+            recorder.pass("photon: beam ways", |pass| {
+                pass.dispatch_indirect(finds, &sets, &bytemuck::cast(push), places.items)?;
+                stage_barrier(pass);
+                Ok(())
+            })?;
+            let queue = &self.beam.queue;
+            recorder.pass("photon: beam queue", |pass| {
+                let collected = queue.set(&self.beam.counters);
+                groups = queue.record(pass, scene, wave, places, AskSettings::default(), &collected)?;
+                Ok(())
+            })?;
+        }
+        recorder.pass("photon: beams", |pass| {
+            match &self.beam.query {
+                Query::Single(kernel) => pass.dispatch_indirect(kernel, &sets, &push, groups)?,
+                Query::Packet(kernel) => pass.dispatch_indirect(kernel, &sets, &bytemuck::cast(push), groups)?,
+            }
+            stage_barrier(pass);
+            Ok(())
+        })
     }
 
     /// The rays that eye paths send along the flights of planes, behind queries.

@@ -143,6 +143,8 @@ pub(crate) const ROWS: &[Row] = &[
         bias: Some(BIAS),
         shaders: &[
             "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_beam.glsl",
+            "shaders/techniques/photon_mapping/photon_beam_way.glsl",
             "shaders/techniques/photon_mapping/photon_event.glsl",
             "shaders/techniques/photon_mapping/photon_event_boxes.comp",
             "shaders/techniques/photon_mapping/photon_event_leaves.comp",

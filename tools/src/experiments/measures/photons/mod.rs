@@ -1,4 +1,4 @@
-//! Photon mapping on surfaces as a whole: what photons and kernels come to, and what a frame costs; kernels in media; pictures are compared by sweeps.
+//! Photon mapping on surfaces as a whole: what photons and kernels come to, and what a frame costs; kernels and queries in media; pictures are compared by sweeps.
 
 pub mod cases;
 mod kernel_contest;
@@ -12,3 +12,4 @@ pub mod photon_queues;
 pub mod photon_statistics;
 pub mod random_numbers;
 pub mod volume_bandwidths;
+pub mod volume_queues;

@@ -29,8 +29,9 @@ const SPOT: f32 = 0.5;
 const SPREAD: f32 = 3.0;
 
 /// A scene of the source with its medium.
-struct Case {
-    name: &'static str,
+pub(super) struct Case {
+    /// What it is called.
+    pub(super) name: &'static str,
     scene: &'static str,
     spot: bool,
     sigma_a: [f32; 3],
@@ -82,7 +83,7 @@ const CATHEDRAL: Case = Case {
 };
 const COLOURED: [f32; 3] = [0.05, 0.3, 0.3];
 
-static CASES: [Case; 9] = [
+pub(super) static CASES: [Case; 9] = [
     RING,
     Case {
         name: "ring, spot",
@@ -193,19 +194,7 @@ impl Case {
     fn row(&self, gpu: &Gpu, size: [u32; 2], share: u32) -> Result<Row> {
         let scene = self.scene(gpu)?;
         let met = |volume_kernel: VolumeKernel| -> Result<(f64, u64)> {
-            let settings = PhotonSettings {
-                path_set: "bounces=1..2".parse()?,
-                photons: self.photons / share,
-                direct_photons: true,
-                profile: KernelProfile::Uniform,
-                unit_length: 1.0,
-                volume_kernel,
-                volume_radius: self.greatest,
-                volume_spread: SPREAD,
-                volume_dampening: self.dampening,
-                ..PhotonSettings::default()
-            };
-            let mut mapper = mapper(gpu, &scene, size, settings)?;
+            let mut mapper = mapper(gpu, &scene, size, self.settings(share, volume_kernel)?)?;
             while mapper.step(1)?.is_some() {}
             let counts = mapper.counts();
             Ok((
@@ -225,7 +214,24 @@ impl Case {
         })
     }
 
-    fn scene(&self, gpu: &Gpu) -> Result<Scene> {
+    /// The source's settings, with its photons over `share`.
+    pub(super) fn settings(&self, share: u32, volume_kernel: VolumeKernel) -> Result<PhotonSettings> {
+        Ok(PhotonSettings {
+            path_set: "bounces=1..2".parse()?,
+            photons: self.photons / share,
+            direct_photons: true,
+            profile: KernelProfile::Uniform,
+            unit_length: 1.0,
+            volume_kernel,
+            volume_radius: self.greatest,
+            volume_spread: SPREAD,
+            volume_dampening: self.dampening,
+            ..PhotonSettings::default()
+        })
+    }
+
+    /// The scene with its medium.
+    pub(super) fn scene(&self, gpu: &Gpu) -> Result<Scene> {
         let mut scene = scene::load(self.scene)?;
         if self.spot {
             for light in &mut scene.lights {

@@ -1,0 +1,205 @@
+// The ways of eye paths through media whose photons they ask for: where a way begins and ends, in which medium, and what the medium leaves of light along it and from the
+// surface behind it. Shared by the queries of the volume map (photon_beam.glsl) and by the stage before those that have a queue (photon_beam_ways.comp).
+//
+// Transmittances are exact in homogeneous media. In a grid one delta tracking a ray finds how far light of each band comes; what lies before counts in
+// full, what lies behind does not: unbiased. One that its quota stops goes on in a later dispatch, before anything is asked. A way that path_medium.comp goes through in
+// several rounds is asked for once: `beam_asked` says how far.
+#ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_BEAM_WAY_GLSL
+#define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_BEAM_WAY_GLSL
+
+#include "transport/features.glsl"
+#include "transport/media_features.glsl"
+#include "techniques/photon_mapping/photon_features.glsl"
+#include "techniques/photon_mapping/photon_eye.glsl"
+#include "techniques/photon_mapping/photon_plane_ray.glsl"
+
+// descriptor set 1: PhotonBeamSet
+
+layout(set = 1, binding = 0) uniform utextureBuffer event_pairs;
+layout(set = 1, binding = 1) uniform utextureBuffer event_records;
+layout(set = 1, binding = 3, scalar) restrict buffer BeamCounters {
+    uint queries;
+    uint events[2];   // kernels that a ray pierced: 64 bits, the low word first
+    // Where COUNT_FETCHES says so, also:
+    uint later;       // queries of rays behind the first bounce
+    uint nodes[2];    // of the tree, fetched once for all rays that go through it together
+    uint records[2];  // likewise
+    uint tests[2];    // pairs of nodes, and records, that each ray has gone through
+} beam_counters;
+layout(set = 1, binding = 4, scalar) restrict buffer PhotonBeamWays { BeamWay beam_ways[]; };    // by place
+layout(set = 1, binding = 5, scalar) restrict buffer PhotonBeamAsked { float beam_asked[]; };    // by slot; of scenes with grids
+// Of maps with planes; elsewhere some other buffer is bound, and nothing is read or written. Rays of earlier bounces have ended.
+layout(set = 1, binding = 6, scalar) restrict buffer PhotonPlaneRays { PlaneRay plane_rays[]; };
+// The queue of the places that ask (photon_queue.glsl); where there is none some other buffer is bound, and nothing is read.
+layout(set = 1, binding = 7, scalar) restrict readonly buffer BeamQueueHead {
+    uint groups[3];
+    uint count;
+    uint block_size;
+} gather_head;
+layout(set = 1, binding = 8, scalar) restrict readonly buffer BeamPlaces { uint gather_places[]; };
+layout(set = 1, binding = 9, scalar) restrict readonly buffer BeamBlocks { uint gather_blocks[]; };
+
+#include "techniques/photon_mapping/photon_queued_place.glsl"
+
+uvec4 compact_quarter(uint index) { return texelFetch(event_pairs, int(index)); }
+
+#include "accel/compact_bvh.glsl"
+
+layout(set = 1, binding = 2, scalar) restrict readonly buffer PhotonEventRoot { CompactRoot event_root; };
+
+layout(push_constant, scalar) uniform Push {
+    WalkKey key;
+    uint surrounding;    // index of the medium outside all bodies, or NO_MEDIUM
+    uint states;         // of a path that asks, in media or on surfaces, a bit each
+    uint volume_states;  // of one that asks on its way through media
+    uint least_bounces;  // scatterings in all, with that of the event
+    uint most_bounces;
+    float scale;         // of stored fluxes
+    float radius;        // of beams, and of collisions beside them
+    float plane_weight;  // of planes' fluxes, beside the scale
+    uint first_place;    // of LINEAR
+    uint first;          // of the records that a linear query goes through
+    uint last;
+    uint classes[ASKING_STATES];  // by state of a path: the classes of photons that count on surfaces, and 16 bits higher those that do in media
+} push;
+
+#include "walk/draws.glsl"
+#include "transport/bodies.glsl"
+#include "transport/media_tracking.glsl"
+#include "walk/media.glsl"
+
+// Stands for the round in the key of the random numbers, so that those of ways and shadow rays do not return.
+const uint BEAM_KEY = 0x20000000u;
+
+// What the query under way is about.
+struct Beam {
+    vec3 origin;
+    vec3 direction;
+    float from;     // of the part that is asked for
+    float to;
+    float start;    // from where the medium takes from light
+    vec3 reach;
+    uint medium;
+    SceneMedium m;
+    uint classes;   // of photons that count, a bit each, where there are classes
+    uint bounce;    // scatterings between the event and the eye
+    float offset;   // of the places of a march, in their distance
+    uvec4 choice;   // key of the choice among planes
+    vec3 weight;    // of the light of planes, on its way to the picture
+};
+Beam beam;
+
+// What the medium leaves of light at a distance.
+vec3 passed_to(float t) {
+    if (HAS_GRIDS && beam.m.has_grid != 0u) {
+        return vec3(lessThan(vec3(t), beam.reach));
+    }
+    return transmittance(beam.m.sigma_t, t - beam.start);
+}
+
+// Finds how far light of each band comes through the grid, from `from` on; false where the quota has stopped it, at `from`.
+bool walk_through_grid(uvec4 key, float end, inout float from) {
+    GridWalk walk = begin_grid_walk(beam.m, beam.origin, beam.direction, from, end);
+    uint iterations = GRID_WALK_QUOTA;
+    uint outcome = GRID_COLLIDED;
+    while (outcome == GRID_COLLIDED && any(equal(beam.reach, vec3(FAR_AWAY)))) {
+        uvec4 bits = grid_draw(key, walk.draw++);
+        float majorant;
+        outcome = next_tentative_collision(beam.m, 1.0, -log(1.0 - unit_float(bits.x)), walk, iterations, majorant);
+        if (outcome == GRID_COLLIDED) {
+            ++walk.nulls;
+            vec3 real = min(beam.m.sigma_t * (grid_density(beam.m, walk) / majorant), vec3(1.0));
+            bvec3 collides = lessThan(vec3(unit_float(bits.y)), real);
+            beam.reach = mix(beam.reach, min(beam.reach, vec3(walk.entry + walk.t)), collides);
+        }
+    }
+    COUNT_MEDIUM(density_lookups, walk.nulls)
+    from = resumed_start(from, walk.entry + walk.t);
+    return outcome != GRID_STOPPED || from >= end;
+}
+
+// Prepares the query of a place, and notes what comes of light from the surface; false where nothing is asked for on the way. Nor is anything where a quota stops the walk
+// through a grid (`walks`), which goes on another time (`goes_on`).
+bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool walks) {
+    walks = false;
+    uint way_state = asking_state(path);
+    if ((push.states >> way_state & 1u) == 0u) {
+        return false;
+    }
+    MediumState state = MediumState(vec3(0.0), 0.0);
+    if (status.rounds > 0u) {
+        state = walk_medium_states[slot];
+    }
+    Hit hit = load_hit(place);
+    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (hit.triangle != NO_HIT) {
+        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
+    }
+    beam.origin = path.origin;
+    beam.direction = path.direction;
+    beam.start = state.start;
+    beam.to = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start);
+    beam.from = max(state.start, 0.0);
+    beam.bounce = asking_bounce(path);
+    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
+    beam.medium = medium_inside(crossing.interior, push.surrounding);
+    beam.reach = vec3(FAR_AWAY);
+    bool asks = (push.volume_states >> way_state & 1u) != 0u && beam.medium != NO_MEDIUM;
+    if (beam.medium != NO_MEDIUM) {
+        beam.m = load_medium(beam.medium);
+        asks = asks && beam.m.sigma_s != vec3(0.0);
+    }
+    bool asked_before = false;
+    if (HAS_GRIDS) {
+        // Of a ray that has just begun nothing has been asked for; of a way that path_medium.comp goes on with, its surface, too.
+        float asked = state.start > 0.0 ? beam_asked[slot] : 0.0;
+        asked_before = asked >= beam.to;
+        beam.from = max(beam.from, asked);
+        if (!asked_before && beam.medium != NO_MEDIUM && beam.m.has_grid != 0u) {
+            float walked = beam.start;
+            uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), BEAM_KEY + walk_round(slot), push.key.seed);
+            if (goes_on) {
+                walked = beam_ways[place].end;
+                beam.reach = beam_ways[place].reach;
+                key.w ^= floatBitsToUint(walked);
+            }
+            walks = !walk_through_grid(key, beam.to, walked);
+            if (walks) {
+                beam_ways[place] = BeamWay(vec3(0.0), beam.from, beam.reach, walked);
+                return false;
+            }
+        }
+        beam_asked[slot] = max(asked, beam.to);
+    }
+    vec3 surface = vec3(0.0);
+    if (hit.triangle != NO_HIT && !asked_before) {
+        surface = beam.medium != NO_MEDIUM ? passed_to(beam.to) : vec3(1.0);
+        if (HAS_ABSORPTION && crossing.interior != OUTSIDE) {
+            surface *= exp(-load_material(crossing.interior).absorption * (beam.to - beam.from));
+        }
+    }
+    beam_ways[place] = BeamWay(surface, beam.from, beam.reach, beam.to);
+    return asks && beam.from < beam.to;
+}
+
+// Prepares the query of a place again whose way is known.
+void resume_beam(uint slot, uint place, WalkState path) {
+    BeamWay way = beam_ways[place];
+    Hit hit = load_hit(place);
+    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (hit.triangle != NO_HIT) {
+        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
+    }
+    beam.origin = path.origin;
+    beam.direction = path.direction;
+    beam.start = status.rounds > 0u ? walk_medium_states[slot].start : 0.0;
+    beam.from = way.start;
+    beam.to = way.end;
+    beam.reach = way.reach;
+    beam.bounce = asking_bounce(path);
+    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
+    beam.medium = medium_inside(crossing.interior, push.surrounding);
+    beam.m = load_medium(beam.medium);
+}
+
+#endif
