@@ -101,6 +101,7 @@ measures! {
     on_device "automatic-choice" rendering::automatic_choice;
     on_device "barriers" device::barriers;
     on_device "bdpt-peers" rendering::bdpt_peers;
+    on_device "beam-estimate" photons::beam_estimate;
     on_device "build-stages" rays::build_stages;
     on_host "camera-footprints" rays::camera_footprints;
     on_device "compact-map" photon_maps::compact_map;

@@ -1,5 +1,6 @@
 //! Photon mapping on surfaces as a whole: what photons and kernels come to, and what a frame costs; kernels in media; pictures are compared by sweeps.
 
+pub mod beam_estimate;
 pub mod cases;
 mod kernel_contest;
 mod kernel_statistics;
