@@ -12,4 +12,6 @@ pub mod photon_peers;
 pub mod photon_queues;
 pub mod photon_statistics;
 pub mod random_numbers;
+mod scenarios;
 pub mod volume_bandwidths;
+pub mod volume_scenes;
