@@ -14,4 +14,5 @@ pub mod photon_statistics;
 pub mod random_numbers;
 mod scenarios;
 pub mod volume_bandwidths;
+pub mod volume_dampening;
 pub mod volume_scenes;
