@@ -190,6 +190,7 @@ measures! {
     on_device "view-shadows" preview::view_shadows;
     on_device "volume-bandwidths" photons::volume_bandwidths;
     on_device "volume-dampening" photons::volume_dampening;
+    on_device "volume-frame" photons::volume_frame;
     on_device "volume-scenes" photons::volume_scenes;
     on_device "vpl-history" virtual_lights::vpl_history;
     on_device "vpl-incremental" virtual_lights::vpl_incremental;

@@ -15,4 +15,5 @@ pub mod random_numbers;
 mod scenarios;
 pub mod volume_bandwidths;
 pub mod volume_dampening;
+pub mod volume_frame;
 pub mod volume_scenes;
