@@ -40,7 +40,7 @@ pub struct Places {
 /// Renders what is missing and returns everything; `load` reads a scene by its address.
 ///
 /// # Errors
-/// Those of scenes, techniques and files. A scene that a technique cannot model is no error: the variant says so in the results.
+/// Those of scenes, techniques and files. A scene that a technique cannot model, or not with a setting, is no error: the variant says so in the results.
 pub fn run(
     gpu: &Gpu,
     experiment: &Experiment,
@@ -180,13 +180,12 @@ impl Running<'_> {
                 None => match self.measure(&mut stage, task, &mut warm, &reference) {
                     Ok(Some(measurement)) => measurement,
                     Ok(None) => continue,
-                    Err(Error::Unsupported { technique, reasons }) => {
-                        let cause = format!("technique {technique}: {}", reasons.join("; "));
+                    Err(error) => {
+                        let cause = refusal(error)?;
                         self.watch.note(&format!("{address}: {}: {cause}", variant.name));
                         variant.refused = Some(cause);
                         continue;
                     }
-                    Err(other) => return Err(other),
                 },
             };
             variant.points[task.budget]
@@ -358,6 +357,18 @@ impl Running<'_> {
     }
 }
 
+/// Why a scene is refused. Settings are those that the technique allows ([`Sweep::check`]), so that one that is refused here does not fit the scene.
+///
+/// # Errors
+/// Any other error.
+fn refusal(error: Error) -> Result<String> {
+    match error {
+        Error::Unsupported { technique, reasons } => Ok(format!("technique {technique}: {}", reasons.join("; "))),
+        setting @ Error::Setting { .. } => Ok(setting.to_string()),
+        other => Err(other),
+    }
+}
+
 /// Radiance alone.
 fn keep_picture(path: &Path, picture: &Picture) -> Result<()> {
     let mut kept = Picture::new(picture.width(), picture.height())?;
@@ -396,4 +407,21 @@ fn judge(rendered: &Rendered, reference: &Picture, task: &Task, budget: Budget, 
         non_finite: metrics.non_finite_test + report.non_finite_samples.total(),
         time: report.time.clone(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_a_scene_is_refused_and_all_else_is_an_error() {
+        let refused = Error::Unsupported {
+            technique: "photon".into(),
+            reasons: vec!["one".into(), "two".into()],
+        };
+        assert_eq!(refusal(refused).unwrap(), "technique photon: one; two");
+        let cause = refusal(Error::setting("volume", "beams", "need homogeneous media")).unwrap();
+        assert_eq!(cause, "setting volume: beams need homogeneous media");
+        assert!(refusal(Error::scene("a.gltf", "meshes", "has none")).is_err());
+    }
 }

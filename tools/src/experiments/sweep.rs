@@ -291,9 +291,13 @@ impl Sweep {
             if variant.name.is_empty() || earlier.iter().any(|other| other.name == variant.name) {
                 return Err(wrong("variant.name", &variant.name, "is empty or there twice"));
             }
-            self.settings(&variant.technique, &variant.settings)?;
+            self.allowed(
+                &variant.technique,
+                &self.settings(&variant.technique, &variant.settings)?,
+            )?;
         }
         let reference = self.reference_settings()?;
+        self.allowed(&self.reference.technique, &reference)?;
         if let Some(sampler) = reference.get("sampler").filter(|sampler| **sampler != INDEPENDENT) {
             return Err(wrong(
                 "reference.settings.sampler",
@@ -303,6 +307,11 @@ impl Sweep {
             ));
         }
         Ok(())
+    }
+
+    /// Refuses settings that the technique refuses, whatever the scene.
+    fn allowed(&self, technique: &str, settings: &Value) -> Result<()> {
+        self.card(technique)?.settings.check(settings)
     }
 
     /// All settings of a technique: its defaults, changed by those given and by the path set.
@@ -399,6 +408,7 @@ mod tests {
             ("spp = [4, 16]", "spp = [4]\nrepeat = 3", "repeat"),
             ("sampler =", "smapler =", "roulette_start"),
             ("sampler =", "path_set =", "the same paths"),
+            ("\"pcg\"", "\"dice\"", "dice"),
             ("name = \"b\"", "name = \"a\"", "twice"),
             ("name = \"b\"", "name = \"b\"\ntechnique = \"magic\"", "magic"),
             ("1024", "1", "reference.spp"),

@@ -5,15 +5,17 @@
 //! of our own.
 
 use std::f32::consts::PI;
+use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec3};
 
 use super::Entry;
+use super::media::{ABSORPTION, G, PHASE, SCATTERING, add_boundary, add_medium, medium, surround};
 use super::parameters::{Parameter, Values};
 use super::shapes::{MeshBuilder, arch, lathe, sheet};
 use super::textures::sky;
 use crate::Result;
-use crate::scene::{Camera, LightKind, Material, Mesh, Scene};
+use crate::scene::{Camera, DensityGrid, LightKind, Material, Mesh, Scene};
 
 pub const ATRIUM: Entry = Entry {
     name: "atrium",
@@ -26,6 +28,22 @@ pub const ATRIUM: Entry = Entry {
             "the open sky, or a lamp in the court",
         ),
         Parameter::color("light", "60", 0.0, 1e6, "intensity of the lamp, W/sr"),
+        ABSORPTION,
+        SCATTERING,
+        PHASE,
+        G,
+        Parameter::choice(
+            "fill",
+            "storey",
+            &["storey", "everywhere"],
+            "where the air is a medium: up to the ceiling of the lower gallery, or in all of space",
+        ),
+        Parameter::choice(
+            "density",
+            "even",
+            &["even", "waves"],
+            "of the medium: even, or a grid of waves with a mean of 1",
+        ),
     ],
     build: atrium,
 };
@@ -47,6 +65,10 @@ pub const CATHEDRAL: Entry = Entry {
             1e6,
             "radiance of the windows, or a hundredth of the lamp's intensity",
         ),
+        ABSORPTION,
+        SCATTERING,
+        PHASE,
+        G,
     ],
     build: cathedral,
 };
@@ -88,12 +110,48 @@ fn lamp(scene: &mut Scene, position: Vec3, intensity: Vec3) {
     scene.add_light("lamp", LightKind::Point { position, intensity });
 }
 
+/// A density over the unit cube: whole waves along each axis, so that the mean of a grid's cells is 1.
+fn waves(p: DVec3) -> f32 {
+    const WAVES: DVec3 = DVec3::new(3.0, 1.0, 2.0);
+    let phase = p * WAVES * TAU;
+    (1.0 + phase.x.sin() * phase.y.cos() * phase.z.sin()) as f32
+}
+
+/// Fills the courtyard with the medium of the parameters, `top` high or in all of space; `outer` is the corner of its walls, above the floor's middle.
+fn fill_courtyard(scene: &mut Scene, values: &Values, outer: Vec3, top: f32) -> Result<()> {
+    const CELLS: [u32; 3] = [32, 16, 32];
+    /// Around the walls and the floor and not inside them, m.
+    const MARGIN: f32 = 0.5;
+    let mut fog = medium("fog", values)?;
+    if fog.is_empty() {
+        return Ok(());
+    }
+    let everywhere = values.word("fill")? == "everywhere";
+    let top = if everywhere { outer.y + MARGIN } else { top };
+    let low = Vec3::new(-outer.x - MARGIN, -MARGIN, -outer.z - MARGIN);
+    let high = Vec3::new(outer.x + MARGIN, top, outer.z + MARGIN);
+    if values.word("density")? == "waves" {
+        let grid = DensityGrid::from_fn(CELLS, waves);
+        fog.density = Some(grid.in_box(low.as_dvec3(), high.as_dvec3()));
+    }
+    let fog = add_medium(scene, fog);
+    if everywhere {
+        scene.surrounding = Some(fog);
+    } else {
+        let boundary = add_boundary(scene, fog);
+        scene.place(MeshBuilder::new("fog", boundary).cuboid(low, high).build());
+    }
+    Ok(())
+}
+
 fn atrium(values: &Values) -> Result<Scene> {
     /// Bays along x and along z, metres from one column to the next, height of a storey, width of the gallery behind the columns.
     const BAYS: [u32; 2] = [8, 4];
     const BAY: f32 = 3.0;
     const STOREY: f32 = 4.6;
     const GALLERY: f32 = 2.8;
+    /// Of a medium in the lower storey, within the ceiling of its gallery.
+    const TOP: f32 = STOREY - 0.1;
     const SHAFT: f64 = 0.22;
     /// Height of the columns; arches of half a bay stand on them.
     const COLUMN: f64 = 2.9;
@@ -221,6 +279,7 @@ fn atrium(values: &Values) -> Result<Scene> {
     } else {
         lamp(&mut scene, Vec3::new(0.0, 4.0, 0.0), values.color("light")?);
     }
+    fill_courtyard(&mut scene, values, outer, TOP)?;
     let far = f64::from(half.x) - 0.8;
     scene.cameras.push(Camera::look_at(
         "main",
@@ -401,6 +460,7 @@ fn cathedral(values: &Values) -> Result<Scene> {
             values.color("light")? * 100.0,
         );
     }
+    surround(&mut scene, "haze", values)?;
     let end = f64::from(length);
     scene.cameras.push(Camera::look_at(
         "main",
@@ -418,4 +478,30 @@ fn cathedral(values: &Values) -> Result<Scene> {
     ));
     scene.defaults.aspect = Some(4.0 / 3.0);
     Ok(scene)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::generate;
+    use crate::scene::SceneProfile;
+
+    #[test]
+    fn media_fill_a_storey_or_everything_and_have_their_mean_density() {
+        let of = |address: &str| generate(&format!("builtin:{address}")).expect("scene");
+        let profile = |address: &str| SceneProfile::of(&of(address));
+        let partly = profile("atrium?source=point&sigma_s=0.1");
+        assert!(partly.media.boundaries && !partly.media.surrounding && partly.media.homogeneous);
+        assert_eq!(partly.triangles, profile("atrium").triangles + 12);
+        assert!(!profile("atrium?fill=everywhere").media.any());
+        let filled = profile("atrium?source=point&sigma_s=0.1&fill=everywhere");
+        assert!(filled.media.surrounding && !filled.media.boundaries);
+        let haze = profile("cathedral?sigma_a=0.05&sigma_s=0.15&phase=schlick&g=0.5");
+        assert!(haze.media.surrounding && haze.media.phases.schlick && haze.media.absorbs);
+        for fill in ["storey", "everywhere"] {
+            let scene = of(&format!("atrium?source=point&sigma_s=0.1&fill={fill}&density=waves"));
+            let grid = scene.media[0].density.as_ref().expect("grid");
+            // Sums over whole waves, of values in f32.
+            assert!((grid.mean() - 1.0).abs() < 1e-7 && grid.max() > 1.5, "{}", grid.mean());
+        }
+    }
 }

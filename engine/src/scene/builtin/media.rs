@@ -28,6 +28,14 @@ pub(super) const G: Parameter = Parameter::real(
 );
 const GREATEST_COEFFICIENT: f64 = 1e6;
 
+/// Parameters of a medium that is not there by default.
+pub(super) const ABSORPTION: Parameter = coefficient(
+    "sigma_a",
+    "0",
+    "absorption coefficient of the air, 1/m; it is a medium where one of both coefficients is above 0",
+);
+pub(super) const SCATTERING: Parameter = coefficient("sigma_s", "0", "scattering coefficient of the air, 1/m");
+
 /// A parameter in 1/m per band.
 pub(super) const fn coefficient(name: &'static str, default: &'static str, meaning: &'static str) -> Parameter {
     Parameter::color(name, default, 0.0, GREATEST_COEFFICIENT, meaning)
@@ -58,6 +66,15 @@ pub(super) fn medium(name: &str, values: &Values) -> Result<Medium> {
 pub(super) fn add_medium(scene: &mut Scene, medium: Medium) -> u32 {
     scene.media.push(medium);
     scene.media.len() as u32 - 1
+}
+
+/// Fills the space outside all bodies with the medium of the parameters; with nothing where they have no coefficient above 0.
+pub(super) fn surround(scene: &mut Scene, name: &str, values: &Values) -> Result<()> {
+    let medium = medium(name, values)?;
+    if !medium.is_empty() {
+        scene.surrounding = Some(add_medium(scene, medium));
+    }
+    Ok(())
 }
 
 /// Adds the material of an invisible boundary around a medium.

@@ -7,6 +7,7 @@
 use glam::{DVec3, Vec2, Vec3};
 
 use super::Entry;
+use super::media::{ABSORPTION, G, PHASE, SCATTERING, surround};
 use super::parameters::{Parameter, Values};
 use super::shapes::{MeshBuilder, cuboid_faces, lat_long_sphere, textured_quad};
 use super::textures::{checker, plain};
@@ -48,6 +49,10 @@ pub const PASSAGE: Entry = Entry {
         Parameter::real("width", "0.2", 0.01, 0.8, "width of the passage, m"),
         Parameter::real("length", "0.2", 0.01, 0.8, "length of the passage, m"),
         Parameter::color("light", "40", 0.0, 1e6, "radiance of the light panel, W·m⁻²·sr⁻¹"),
+        ABSORPTION,
+        SCATTERING,
+        PHASE,
+        G,
     ],
     build: passage,
 };
@@ -210,6 +215,7 @@ fn passage(values: &Values) -> Result<Scene> {
         Vec3::new(0.35, 0.98, 0.5),
         Vec2::splat(0.1),
     );
+    surround(&mut scene, "haze", values)?;
     scene.cameras.push(Camera::look_at(
         "main",
         DVec3::new(1.92, 0.6, 0.9),
@@ -309,6 +315,14 @@ mod tests {
         }
         let all = all.build();
         assert_eq!((area(&all), volume(&all), open_edges(&all)), (144.0, -108.0, 0));
+    }
+
+    #[test]
+    fn haze_fills_both_rooms() {
+        let media =
+            |query: &str| SceneProfile::of(&generate(&format!("builtin:passage?{query}")).expect("scene")).media;
+        assert!(media("sigma_s=0.5&g=0.6").surrounding && media("sigma_s=0.5&g=0.6").phases.henyey_greenstein);
+        assert!(!media("g=0.6").any());
     }
 
     #[test]

@@ -43,6 +43,14 @@ pub fn greatest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().reduce(greater).unwrap_or(f64::NAN)
 }
 
+/// The mean of independent numbers, and its standard error by their spread; the latter is not a number of a single one.
+pub fn mean_with_error(values: &[f64]) -> [f64; 2] {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    [mean, (squares / (count * (count - 1.0))).sqrt()]
+}
+
 /// The logarithm of a share of so many independent draws, and its variance by chance. Half a draw more on either side leaves one without any that is
 /// wrong a logarithm, and takes nearly all bias off the others'. Source: J. J. Gart and J. R. Zweifel, *On the Bias of Various Estimators of the
 /// Logit and its Variance*, Biometrika 1967.
@@ -101,6 +109,14 @@ mod tests {
         assert!(none.value == 1.0 && none.high > 10.0, "{none:?}");
         assert!(mean_ratio_of_shares([([0.5, f64::NAN], 1000)]).value.is_nan());
         assert!(mean_ratio_of_shares([]).value.is_nan());
+    }
+
+    #[test]
+    fn errors_of_means_are_those_of_their_spread() {
+        let [mean, error] = mean_with_error(&[1.0, 2.0, 3.0, 4.0]);
+        // Four numbers with the variance 5/3.
+        assert!((mean - 2.5).abs() < 1e-12 && (error - (5.0f64 / 12.0).sqrt()).abs() < 1e-12);
+        assert!(mean_with_error(&[1.0])[1].is_nan());
     }
 
     #[test]

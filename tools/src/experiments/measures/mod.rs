@@ -101,6 +101,7 @@ measures! {
     on_device "automatic-choice" rendering::automatic_choice;
     on_device "barriers" device::barriers;
     on_device "bdpt-peers" rendering::bdpt_peers;
+    on_device "beam-estimate" photons::beam_estimate;
     on_device "build-stages" rays::build_stages;
     on_host "camera-footprints" rays::camera_footprints;
     on_device "compact-map" photon_maps::compact_map;
@@ -188,6 +189,9 @@ measures! {
     on_device "upsampling" preview::upsampling;
     on_device "view-shadows" preview::view_shadows;
     on_device "volume-bandwidths" photons::volume_bandwidths;
+    on_device "volume-dampening" photons::volume_dampening;
+    on_device "volume-frame" photons::volume_frame;
+    on_device "volume-scenes" photons::volume_scenes;
     on_device "volume-queues" photons::volume_queues;
     on_device "vpl-history" virtual_lights::vpl_history;
     on_device "vpl-incremental" virtual_lights::vpl_incremental;

@@ -1,15 +1,14 @@
 //! What queues and packets cost and gain where rays ask the volume map: time of density estimation, nodes fetched, and the stages of a frame with their jobs.
 //!
 //! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4, Tables 7.4 and 7.5, of 512 × 512 pixels on a
-//! GPU of its time; scenes and media are those of `volume_bandwidths`.
+//! GPU of its time; scenes and media are those of `scenarios`.
 
-use clerestory::Result;
 use clerestory::gpu::{Gpu, Timings};
-use clerestory::techniques::photon_mapping::volume::VolumeKernel;
 use clerestory::techniques::photon_mapping::{MapQuery, MapQueue, PhotonMapper, PhotonSettings};
+use clerestory::{Result, scene};
 
 use super::cases::mapper;
-use super::volume_bandwidths::{CASES, Case};
+use super::scenarios::{Depths, SCENARIOS, Scenario, TWO_BOUNCES};
 use crate::experiments::findings::{
     Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows,
 };
@@ -121,7 +120,7 @@ const INSTRUCTIONS: usize = 0;
 const TIMES: usize = 1;
 
 fn published(scene: &str, form: &str, what: usize) -> Option<f64> {
-    let scene = CASES.iter().position(|case| case.name == scene)?;
+    let scene = SCENARIOS.iter().position(|scenario| scenario.name == scene)?;
     let form = FORMS.iter().position(|known| known.name == form)?;
     Some(PUBLISHED[scene][what][form])
 }
@@ -331,10 +330,10 @@ impl Taken {
 }
 
 /// All forms on one scene, with their frames taken in turns: samples of one pass, so that all have the same map. What they take is counted beside, by other kernels.
-fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, case: &Case) -> Result<Found> {
-    let scene = case.scene(gpu)?;
+fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario) -> Result<Found> {
+    let scene = scene::load(scenario.scene)?;
     let size = context.pick(SIZE, SMOKE_SIZE);
-    let settings = case.settings(context.pick(SHARE, SMOKE_SHARE), VolumeKernel::Footprint)?;
+    let settings = scenario.settings(TWO_BOUNCES, Depths::UpToOne, context.pick(SHARE, SMOKE_SHARE))?;
     let with = |form: &Form, count_fetches: bool| {
         let settings = PhotonSettings {
             queue: form.queue,
@@ -373,7 +372,7 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, case: &Case) -> Result<Found
     let along_rays = rate(counts.beams.photons, ESTIMATION);
     let on_surfaces = rate(counts.gather.photons, SURFACES);
     let seen = Seen {
-        scene: case.name.into(),
+        scene: scenario.name.into(),
         photons: settings.photons.into(),
         events: counts.events,
         rays: counts.beams.queries as f64 * per_frame,
@@ -405,7 +404,7 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, case: &Case) -> Result<Found
     };
     for (i, form) in FORMS.iter().enumerate() {
         found.forms.push(Row {
-            scene: case.name.into(),
+            scene: scenario.name.into(),
             form: form.name.into(),
             time: times[i].clone(),
             collecting: repeats(&turns[i], |frame| frame.collecting),
@@ -417,7 +416,7 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, case: &Case) -> Result<Found
             fewer_nodes: (form.query == MapQuery::Packet).then(|| taken[form.single].nodes / taken[i].nodes),
         });
         found.changes.push(Change {
-            scene: case.name.into(),
+            scene: scenario.name.into(),
             form: form.name.into(),
             rate: times[0].change_from(&times[i]),
             time: times[i].change_from(&times[0]),
@@ -429,7 +428,7 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, case: &Case) -> Result<Found
     for (place, (stage, _)) in STAGES.iter().enumerate() {
         let (jobs, later_jobs) = jobs(stage);
         found.stages.push(Stage {
-            scene: case.name.into(),
+            scene: scenario.name.into(),
             stage: (*stage).into(),
             jobs,
             later_jobs,
@@ -445,12 +444,12 @@ impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
         let mut all = Self::default();
-        let cases: Vec<&Case> = context.first(&CASES, 1).iter().collect();
+        let scenarios: Vec<&Scenario> = context.first(&SCENARIOS, 1).iter().collect();
         let scenes = context.each(
-            &cases,
-            |case| case.name.to_owned(),
-            |case| {
-                let of_scene = scene_of_forms(context, &gpu, case)?;
+            &scenarios,
+            |scenario| scenario.name.to_owned(),
+            |scenario| {
+                let of_scene = scene_of_forms(context, &gpu, scenario)?;
                 all.forms.extend(of_scene.forms);
                 all.changes.extend(of_scene.changes);
                 all.stages.extend(of_scene.stages);
