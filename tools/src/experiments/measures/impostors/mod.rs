@@ -3,6 +3,7 @@
 pub mod convolved_maps;
 pub mod exact_room;
 pub mod gather_counts;
+pub mod gather_fireballs;
 pub mod gather_frame;
 pub mod gather_glossy;
 pub mod gather_places;
