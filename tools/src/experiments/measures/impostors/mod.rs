@@ -13,6 +13,8 @@ pub mod impostor_methods;
 pub mod impostor_motion;
 pub mod impostor_occlusion;
 pub mod impostor_roots;
+pub mod impostor_trace;
+pub mod moving_mirror;
 pub mod published_searches;
 pub mod search_times;
 pub mod virtual_images;
