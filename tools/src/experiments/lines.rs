@@ -28,6 +28,14 @@ impl Line {
     }
 }
 
+/// Decimals that multiples of a step need.
+fn decimals(step: f64) -> usize {
+    const MOST: usize = 3;
+    let is_whole = |scaled: f64| (scaled - scaled.round()).abs() < 1e-9;
+    let scales = [1.0, 10.0, 100.0];
+    scales.iter().position(|scale| is_whole(step * scale)).unwrap_or(MOST)
+}
+
 /// Draws functions from 0 to `top`, over as many steps of an axis from 0 on, each of which is named.
 ///
 /// # Errors
@@ -59,6 +67,7 @@ fn onto(
     root.fill(&WHITE).map_err(|e| failed(&e))?;
     let (left, right) = root.split_horizontally(SIZE.0 - legend::WIDTH);
     legend::draw(&right, &entries)?;
+    let digits = decimals(step);
     let mut chart = ChartBuilder::on(&left)
         .caption(words.title, (FONT, 15))
         .margin(10)
@@ -71,7 +80,7 @@ fn onto(
         .x_desc(words.x)
         .y_desc(words.y)
         .x_labels(steps as usize + 1)
-        .x_label_formatter(&|at| format!("{:.0}", at * step))
+        .x_label_formatter(&|at| format!("{:.digits$}", at * step))
         .axis_desc_style((FONT, 14))
         .label_style((FONT, 12))
         .bold_line_style(RGBColor(210, 210, 210))
@@ -94,6 +103,18 @@ fn onto(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn axes_name_steps_by_their_decimals() {
+        assert_eq!([10.0, 1.0, 0.1, 0.25, 0.125].map(decimals), [0, 0, 1, 2, 3]);
+        let words = Words {
+            title: "t",
+            x: "x",
+            y: "y",
+        };
+        let svg = draw(words, (4, 0.25), 1.0, &[]).unwrap();
+        assert!(svg.contains("0.75"), "{svg}");
+    }
 
     #[test]
     fn what_leaves_the_frame_is_left_out() {

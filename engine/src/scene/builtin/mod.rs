@@ -7,9 +7,11 @@ mod city;
 mod conference;
 mod cornell;
 mod corner_lamp;
+mod fireballs;
 mod fog;
 mod forest;
 mod furnace;
+mod game_room;
 mod halls;
 mod lamp_hall;
 mod materials;
@@ -62,11 +64,13 @@ pub fn catalogue() -> &'static [Entry] {
         cornell::CORNELL_BOX,
         corner_lamp::CORNER_LAMP,
         rooms::DIVIDER_ROOM,
+        fireballs::FIREBALLS,
         fog::FOG_BOX,
         forest::FOREST,
         furnace::FURNACE_BOX,
         media::FURNACE_MEDIUM,
         furnace::FURNACE_SPHERE,
+        game_room::GAME_ROOM,
         lamp_hall::LAMP_HALL,
         materials::MATERIALS,
         media::MEDIUM_SLAB,

@@ -129,6 +129,7 @@ measures! {
     on_host "impostor-motion" impostors::impostor_motion;
     on_host "impostor-occlusion" impostors::impostor_occlusion;
     on_host "impostor-roots" impostors::impostor_roots;
+    on_device "impostor-trace" impostors::impostor_trace;
     on_device "kd-caches" kd::kd_caches.of_any_scenes();
     on_device "kd-heuristics" kd::kd_heuristics.of_any_scenes();
     on_device "kd-hosts" kd::kd_hosts.of_any_scenes();

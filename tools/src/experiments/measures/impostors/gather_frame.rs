@@ -15,10 +15,13 @@ use glam::{DAffine3, DVec3};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 
-const SCENES: [&str; 3] = [
+const SCENES: [&str; 6] = [
     "builtin:cornell-box?source=point&sphere=gold",
     "builtin:divider-room?object=gold&roughness=0.4",
     "builtin:box-room?source=point&mirror=no",
+    "builtin:game-room?surface=gold&roughness=0.4",
+    "builtin:fireballs",
+    "builtin:fireballs?bodies=1&shape=knot",
 ];
 /// Pixels, and frames that count, after one that compiles kernels.
 const FULL: ([u32; 2], u32) = ([320, 240], 12);

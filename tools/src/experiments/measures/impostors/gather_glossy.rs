@@ -1,4 +1,4 @@
-//! Glossy light of spheres at several places by the map at its place, and by localised gathers of more and more texels.
+//! Glossy light of spheres at several places, and of a column between balls of fire, by the map at its place, and by localised gathers of more and more texels.
 //!
 //! Oracle: sums over directions of what is seen in them from the points. What was published as a reference, the finest gather, is one of those that are judged here.
 
@@ -7,6 +7,7 @@ use clerestory::maps::gather::lit_room::{LitRoom, relative_errors};
 use clerestory::maps::gather::{Gather, GatherLights, GatherPoint, GatherSettings, SolidAngleForm};
 use glam::DVec3;
 
+use super::gather_fireballs::{self, Part};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, rows};
 use crate::experiments::measures::Context;
 
@@ -17,7 +18,7 @@ const EXPONENT: f32 = 5.0;
 const DIRECTIONS: u32 = 96;
 const SIDES: [u32; 4] = [2, 4, 8, 16];
 /// Texels along a face's side of the map at its place.
-const CLASSICAL_SIDE: u32 = 32;
+pub const CLASSICAL_SIDE: u32 = 32;
 
 rows! {
     /// A gather at a place.
@@ -32,11 +33,17 @@ rows! {
     }
 }
 /// What was found.
-pub type Found = Vec<Row>;
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    spheres: Vec<Row>,
+    column: Vec<Part>,
+}
 
-const CLASSICAL: &str = "map at its place";
+/// What tables call the map at its place.
+pub const CLASSICAL: &str = "map at its place";
 
-fn way(side: u32) -> String {
+/// What tables call a gather.
+pub fn way(side: u32) -> String {
     format!("{side}² texels a face")
 }
 
@@ -77,7 +84,7 @@ impl Study for Found {
             .collect::<Result<_>>()?;
         let still = room.lights(CLASSICAL_SIDE, SolidAngleForm::Disc)?;
         let places = context.first(&LitRoom::PLACES, 1);
-        context.each(places, DVec3::to_string, |place| {
+        let spheres = context.each(places, DVec3::to_string, |place| {
             let points = LitRoom::points(*place, count);
             let exact = room.glossy(&points, f64::from(EXPONENT), directions);
             let errors = |lights: &GatherLights, points: &[GatherPoint]| -> Result<[f64; 2]> {
@@ -110,14 +117,22 @@ impl Study for Found {
                 coarser = Some(found[0]);
             }
             Ok(rows)
+        })?;
+        Ok(Self {
+            spheres,
+            column: gather_fireballs::parts(context, &gpu)?,
         })
     }
 
     fn findings(&self) -> Findings {
         let corner = LitRoom::PLACES[3].to_string();
-        let finest = self.iter().find(|row| row.place == corner && row.way == way(16));
-        let drawn: Vec<Row> = self.iter().filter(|row| row.way != CLASSICAL).cloned().collect();
-        Findings::of(self, CRITERIA)
+        let finest = self
+            .spheres
+            .iter()
+            .find(|row| row.place == corner && row.way == way(16));
+        let drawn = self.spheres.iter().filter(|row| row.way != CLASSICAL);
+        let drawn: Vec<Row> = drawn.cloned().collect();
+        Findings::of(&self.spheres, CRITERIA)
             .headline(
                 "in the corner, RMS of sixteen texels a side over that of the map at its place",
                 finest.map(|row| row.of_classical.into()),
@@ -129,5 +144,6 @@ impl Study for Found {
                 Axes::rates("terms", "RMS (%)"),
                 curves(&drawn, |row| row.place.clone(), |row| (row.terms as f64, row.rms.into())),
             )
+            .and(gather_fireballs::findings(&self.column))
     }
 }

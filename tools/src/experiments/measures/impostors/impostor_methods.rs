@@ -14,6 +14,7 @@ use clerestory::maps::impostor::{
 use clerestory::maps::{MapImage, Parametrization};
 use glam::DVec3;
 
+use super::published_searches::{Figures, Published, SEEN_SHARES, name, searches};
 use super::search_times::{self, Beside, Steps};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
@@ -38,11 +39,24 @@ rows! {
         seen: Option<f64> = "mean error of rays whose hit the map's place sees (°)",
         published_seen: Option<f64> = "published mean of these (°)",
         high: f64 = "95 % of rays are below (°)",
+        published_high: Option<f64> = "published: 95 % are below (°)",
         largest: f64 = "largest (°)",
+        published_largest: Option<f64> = "published largest (°)",
         good: f64 = "rays below 1° (%)",
         published_good: Option<f64> = "published share below 1° (%)",
+        seen_good: Option<f64> = "rays below 1° of those whose hit the map's place sees (%)",
+        published_seen_good: Option<f64> = "published share of these below 1° (%)",
         missed: Option<f64> = "difference from what was published over what is allowed",
         time: Option<Measured> = "time of a ray's search on the device (ns)",
+    }
+}
+rows! {
+    /// A sphere beside an obstacle.
+    struct Seen = "Rays whose hit the map's place sees" by [sphere] {
+        sphere: String = "sphere",
+        rays: u64 = "rays",
+        share: f64 = "seen (%)",
+        published: f64 = "published share (%)",
     }
 }
 rows! {
@@ -62,6 +76,7 @@ rows! {
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
     look_ups: Vec<Row>,
+    seen: Vec<Seen>,
     times: Vec<Time>,
     steps: Vec<Steps>,
     beside: Vec<Beside>,
@@ -74,7 +89,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.missed.unwrap_or(f64::NAN).into(),
     )
     .among(|row| row.missed.is_some())
-    .because("a fifth of the published value, or 0.03°; a point of a share"),
+    .because("a fifth of the published mean, 95 % or largest, or 0.03°; a point of a share"),
     Criterion::each(
         "the box is its room: the largest error (°)",
         Bound::AtMost(1e-5),
@@ -83,6 +98,12 @@ const CRITERIA: &[Criterion<Row>] = &[
     .among(|row| row.way == BOX)
     .in_every_form(),
 ];
+
+const OF_SEEN: &[Criterion<Seen>] = &[Criterion::each(
+    "as many hits are seen as published: difference of the shares (points)",
+    Bound::AtMost(1.0),
+    |row: &Seen| (row.share - row.published).abs().into(),
+)];
 
 const OF_TIMES: &[Criterion<Time>] = &[
     Criterion::each(
@@ -102,127 +123,22 @@ const OF_TIMES: &[Criterion<Time>] = &[
 
 const BOX: &str = "box in place of the room";
 
-/// What was published of a sphere's rays: all, those whose hit is seen, and the share below a degree.
-struct Published {
-    sphere: ShinySphere,
-    settings: ImpostorSettings,
-    layers: u32,
-    all: Option<f64>,
-    seen: Option<f64>,
-    good: Option<f64>,
-}
-
-/// Above it no crossing is passed over.
-const ANY: f32 = 0.999;
-
-fn name(settings: &ImpostorSettings, layers: u32) -> String {
-    let ImpostorSettings { method, steps, .. } = settings;
-    match layers {
-        1 if settings.tolerance == ANY => format!("{method} to the first crossing +{steps}"),
-        1 => format!("{method} +{steps}"),
-        _ => format!("{method} +{steps}, {layers} layers"),
-    }
-}
-
-/// All that is searched, with the means that were published.
-fn searches() -> Vec<Published> {
-    use SearchMethod::{
-        Classical, FalsePosition, FixedPoint, Hybrid, March, Mixed, Perpendicular, SecantFromGuess, SecantFromPoint,
-    };
-    let mut all = Vec::new();
-    let mut add_with = |sphere: ShinySphere, settings, layers, figures: [Option<f64>; 3]| {
-        let [mean, seen, good] = figures;
-        all.push(Published {
-            sphere,
-            settings,
-            layers,
-            all: mean,
-            seen,
-            good,
-        });
-    };
-    let first = ImpostorSettings {
-        tolerance: ANY,
-        ..ImpostorSettings::of(March, 64)
-    };
-    add_with(ShinySphere::BOX, first, 1, [0.21, 0.017, 98.1].map(Some));
-    add_with(ShinySphere::P1, first, 1, [7.5, 0.003, 70.2].map(Some));
-    add_with(ShinySphere::P2, first, 1, [None; 3]);
-    let mut add = |sphere, method, steps, layers, figures| {
-        add_with(sphere, ImpostorSettings::of(method, steps), layers, figures);
-    };
-    let convex: [(SearchMethod, u32, [f64; 3]); 14] = [
-        (Classical, 0, [9.75, 11.96, 30.88]),
-        (Perpendicular, 0, [0.64, 0.87, 5.60]),
-        (SecantFromPoint, 0, [0.95, 2.13, 17.9]),
-        (SecantFromGuess, 0, [0.008, 0.010, 0.712]),
-        (SecantFromPoint, 1, [0.241, 0.568, 21.1]),
-        (SecantFromPoint, 10, [0.0, 0.0, 18.7]),
-        (SecantFromGuess, 1, [0.0, 0.0, 0.028]),
-        (SecantFromGuess, 3, [0.0, 0.0, 0.0]),
-        (FalsePosition, 1, [0.029, 0.052, 4.08]),
-        (FalsePosition, 3, [0.001, 0.001, 0.419]),
-        (FalsePosition, 10, [0.0, 0.0, 0.005]),
-        (Mixed, 1, [0.001, 0.001, 0.250]),
-        (Mixed, 3, [0.0, 0.0, 0.045]),
-        (Mixed, 10, [0.0, 0.0, 0.001]),
-    ];
-    for (i, sphere) in [ShinySphere::A, ShinySphere::B, ShinySphere::C].into_iter().enumerate() {
-        for (method, steps, means) in convex {
-            add(sphere, method, steps, 1, [Some(means[i]), None, None]);
-        }
-        for steps in [0, 3, 10] {
-            add(sphere, FixedPoint, steps, 1, [None; 3]);
-        }
-        add(sphere, Hybrid, 3, 1, [None; 3]);
-        add(sphere, March, 64, 1, [None; 3]);
-    }
-    let hidden: [(SearchMethod, u32, [f64; 4]); 6] = [
-        (Classical, 0, [21.1, 21.2, 30.9, 23.8]),
-        (SecantFromGuess, 0, [1.95, 1.50, 15.9, 1.19]),
-        (FalsePosition, 3, [0.39, 0.19, 8.3, 0.52]),
-        (FalsePosition, 10, [0.23, 0.042, 7.9, 0.064]),
-        (Mixed, 3, [0.40, 0.20, 12.7, 0.35]),
-        (Mixed, 10, [0.33, 0.136, 11.9, 0.072]),
-    ];
-    for (i, sphere) in [ShinySphere::BOX, ShinySphere::P1].into_iter().enumerate() {
-        for (method, steps, means) in hidden {
-            add(
-                sphere,
-                method,
-                steps,
-                1,
-                [Some(means[2 * i]), Some(means[2 * i + 1]), None],
-            );
-        }
-        add(sphere, Hybrid, 3, 1, [None; 3]);
-    }
-    add(ShinySphere::BOX, SecantFromGuess, 10, 1, [0.84, 0.65, 97.1].map(Some));
-    add(ShinySphere::P1, SecantFromGuess, 10, 1, [15.6, 0.024, 70.2].map(Some));
-    add(ShinySphere::P2, FalsePosition, 10, 1, [None, Some(69.7), None]);
-    add(ShinySphere::P2, Hybrid, 10, 1, [Some(31.1), Some(2.1), None]);
-    for (sphere, shares) in [
-        (ShinySphere::P1, [69.9, 79.1, 98.7]),
-        (ShinySphere::P2, [30.8, 50.3, 99.1]),
-    ] {
-        for (layers, share) in (1..).zip(shares) {
-            add(sphere, March, 64, layers, [None, None, Some(share)]);
-        }
-    }
-    all
-}
-
 /// The row of directions that were looked up; all but times.
 fn row(sphere: &ShinySphere, map: String, way: String, rays: &[ImpostorRay], directions: &[DVec3]) -> Row {
-    let (mut all, mut seen, mut good) = (Errors::default(), Errors::default(), 0u64);
+    let (mut all, mut seen) = (Errors::default(), Errors::default());
+    let (mut good, mut seen_good, mut seen_rays) = (0u64, 0u64, 0u64);
     for (ray, direction) in rays.iter().zip(directions) {
         let error = sphere.room.error(ray, *direction);
+        let is_good = u64::from(error < 1.0);
         all.add(error);
-        good += u64::from(error < 1.0);
+        good += is_good;
         if sphere.room.sees_hit(ray) {
             seen.add(error);
+            seen_good += is_good;
+            seen_rays += 1;
         }
     }
+    let share = |count: u64, of: u64| 100.0 * count as f64 / of.max(1) as f64;
     Row {
         sphere: sphere.name.into(),
         map,
@@ -232,24 +148,46 @@ fn row(sphere: &ShinySphere, map: String, way: String, rays: &[ImpostorRay], dir
         seen: sphere.room.obstacle.map(|_| seen.mean()),
         published_seen: None,
         high: all.quantile(0.95),
+        published_high: None,
         largest: all.worst(),
-        good: 100.0 * good as f64 / rays.len().max(1) as f64,
+        published_largest: None,
+        good: share(good, rays.len() as u64),
         published_good: None,
+        seen_good: sphere.room.obstacle.map(|_| share(seen_good, seen_rays)),
+        published_seen_good: None,
         missed: None,
         time: None,
     }
 }
 
-/// By how much the row misses what was published, over what is allowed.
-fn missed(row: &Row) -> Option<f64> {
-    let degrees = |found: f64, published: f64| (found - published).abs() / f64::max(0.2 * published, 0.03);
-    let mean = row.published.map(|published| degrees(row.mean, published));
-    let seen = row
-        .published_seen
-        .zip(row.seen)
-        .map(|(published, seen)| degrees(seen, published));
-    let good = row.published_good.map(|published| (row.good - published).abs());
-    [mean, seen, good].into_iter().flatten().reduce(f64::max)
+impl Row {
+    /// The same beside what was published, with by how much it misses that over what is allowed.
+    fn beside(self, published: &Figures) -> Self {
+        let degrees = |found: f64, published: f64| (found - published).abs() / f64::max(0.2 * published, 0.03);
+        let of_degrees = [
+            (Some(self.mean), published.mean),
+            (self.seen, published.seen),
+            (Some(self.high), published.high),
+            (Some(self.largest), published.largest),
+        ];
+        let of_shares = [(Some(self.good), published.good), (self.seen_good, published.seen_good)];
+        let of_degrees = of_degrees
+            .into_iter()
+            .filter_map(|(found, published)| Some(degrees(found?, published?)));
+        let of_shares = of_shares
+            .into_iter()
+            .filter_map(|(found, published)| Some((found? - published?).abs()));
+        Self {
+            published: published.mean,
+            published_seen: published.seen,
+            published_high: published.high,
+            published_largest: published.largest,
+            published_good: published.good,
+            published_seen_good: published.seen_good,
+            missed: of_degrees.chain(of_shares).reduce(f64::max),
+            ..self
+        }
+    }
 }
 
 /// Rows of one sphere in one map.
@@ -285,17 +223,11 @@ fn searched(
     for ((search, kernel), time) in all.iter().zip(&kernels).zip(&times) {
         let (hits, _) = kernel.search_timed(of(search), &rays)?;
         let directions: Vec<DVec3> = hits.iter().map(|hit| hit.direction).collect();
-        let mut found = row(
-            sphere,
-            map.to_string(),
-            name(&search.settings, search.layers),
-            &rays,
-            &directions,
-        );
-        (found.published, found.published_seen, found.published_good) = (search.all, search.seen, search.good);
-        found.missed = missed(&found);
-        found.time = Some(time.into());
-        rows.push(found);
+        let way = name(&search.settings, search.layers);
+        rows.push(Row {
+            time: Some(time.into()),
+            ..row(sphere, map.to_string(), way, &rays, &directions).beside(&search.figures)
+        });
     }
     Ok(rows)
 }
@@ -359,25 +291,23 @@ fn without_distances(side: u32) -> Result<Vec<Row>> {
     ];
     for (sphere, spheres) in published {
         let rays = sphere.rays(side, None);
-        let mut add = |way: String, published: Option<f64>, of: &dyn Fn(DVec3, DVec3) -> DVec3| {
+        let mut add = |way: String, published: Figures, of: &dyn Fn(DVec3, DVec3) -> DVec3| {
             let directions: Vec<DVec3> = rays.iter().map(|ray| of(ray.origin, ray.direction)).collect();
-            let mut found = row(&sphere, "none".into(), way, &rays, &directions);
-            found.published = published;
-            found.missed = missed(&found);
-            rows.push(found);
+            rows.push(row(&sphere, "none".into(), way, &rays, &directions).beside(&published));
         };
-        add(BOX.into(), None, &|x, r| {
+        add(BOX.into(), Figures::NONE, &|x, r| {
             x + box_proxy(x, r, DVec3::NEG_ONE, DVec3::ONE) * r
         });
         for (radius, published) in [1.0, 1.2, 1.5].into_iter().zip(spheres) {
             let of = |x: DVec3, r: DVec3| x + sphere_proxy(x, r, radius) * r;
             add(
                 format!("sphere of radius {radius} in place of the room"),
-                Some(published),
+                Figures::of_mean(published),
                 &of,
             );
         }
-        add("hemisphere of radius 1.2 above the ground".into(), None, &|x, r| {
+        let hemisphere = "hemisphere of radius 1.2 above the ground";
+        add(hemisphere.into(), Figures::NONE, &|x, r| {
             x + hemisphere_proxy(x, DVec3::Y, 1.2) * r
         });
     }
@@ -417,18 +347,26 @@ fn refracted(gpu: &Gpu, side: u32, texels: f64) -> Result<Vec<Row>> {
         let settings = ImpostorSettings::of(method, steps);
         let hits = impostor.search(&rays, &settings)?;
         let directions: Vec<DVec3> = hits.iter().map(|hit| hit.direction).collect();
-        let mut found = row(
-            &sphere,
-            map.to_string(),
-            format!("refracted, {}", name(&settings, 1)),
-            &rays,
-            &directions,
-        );
-        found.published = Some(published);
-        found.missed = missed(&found);
-        rows.push(found);
+        let way = format!("refracted, {}", name(&settings, 1));
+        rows.push(row(&sphere, map.to_string(), way, &rays, &directions).beside(&Figures::of_mean(published)));
     }
     Ok(rows)
+}
+
+/// Shares of hits that the map's place sees.
+fn seen(side: u32) -> Vec<Seen> {
+    SEEN_SHARES
+        .map(|(sphere, published)| {
+            let rays = sphere.rays(side, None);
+            let seen = rays.iter().filter(|ray| sphere.room.sees_hit(ray)).count();
+            Seen {
+                sphere: sphere.name.into(),
+                rays: rays.len() as u64,
+                share: 100.0 * seen as f64 / rays.len().max(1) as f64,
+                published,
+            }
+        })
+        .into()
 }
 
 impl Study for Found {
@@ -478,6 +416,7 @@ impl Study for Found {
         let timed_maps = context.first(&maps, 1);
         Ok(Self {
             look_ups: rows,
+            seen: seen(side),
             times: context.each(timed_maps, Parametrization::to_string, |map| times(*map))?,
             steps: context.each(timed_maps, Parametrization::to_string, |map| {
                 search_times::by_steps(context, &gpu, *map, texels)
@@ -499,6 +438,7 @@ impl Study for Found {
                  and which several layers need. Times are those of the search alone; of the classical look-up, which searches for nothing, of a kernel \
                  that copies directions.",
             )
+            .and(Findings::of(&self.seen, OF_SEEN))
             .and(Findings::of(&self.times, OF_TIMES))
             .note(
                 "Each look-up ends with one fetch of radiance, so that the classical one is that fetch alone. Nearest texels without planes. Published times are those of whole pictures \

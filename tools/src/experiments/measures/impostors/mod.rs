@@ -3,6 +3,7 @@
 pub mod convolved_maps;
 pub mod exact_room;
 pub mod gather_counts;
+pub mod gather_fireballs;
 pub mod gather_frame;
 pub mod gather_glossy;
 pub mod gather_places;
@@ -12,5 +13,8 @@ pub mod impostor_methods;
 pub mod impostor_motion;
 pub mod impostor_occlusion;
 pub mod impostor_roots;
+pub mod impostor_trace;
+pub mod moving_mirror;
+pub mod published_searches;
 pub mod search_times;
 pub mod virtual_images;

@@ -10,6 +10,8 @@ use clerestory::transport::fresnel::table::{NODES, fresnel_table, fresnel_table_
 use clerestory::transport::fresnel::{fresnel_conductor, rescaled::fresnel_schlick_index};
 use glam::{DVec3, Vec3};
 
+use super::fresnel_dips::Dips;
+use super::fresnel_rescaling::Rescaling;
 use super::published_metals::{PUBLISHED, Published};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
@@ -22,6 +24,15 @@ const HAGEMANN: [(&str, [f64; 3]); 4] = [
     ("copper-hagemann", [670.0, 550.0, 435.0]),
     ("aluminium-hagemann", [700.0, 550.0, 435.0]),
 ];
+/// The wavelength at which the published index of Hagemann's gold is another than that of the table, nm.
+const DISPUTED: f64 = 435.0;
+/// That index, its extinction, and the published error of the rescaled curve with it, %.
+const DISPUTED_INDEX: [f64; 2] = [1.859, 1.823];
+const DISPUTED_ERROR: f64 = 8.60;
+/// The samples of the table about that wavelength: nm, and n.
+const ABOUT_DISPUTED: [[f64; 2]; 2] = [[413.3, 1.950], [442.8, 1.862]];
+/// The first of them with another digit.
+const OTHER_DIGIT: f64 = 1.850;
 /// Percentage points by which a published error may be missed.
 const POINTS: f64 = 0.05;
 /// Steps of the curves that are drawn.
@@ -80,11 +91,26 @@ rows! {
     }
 }
 
+rows! {
+    /// Where an index of refraction is from.
+    struct Gold = "The rescaled curve at Hagemann's gold at 435 nm, by where the index is from" by [source] {
+        source: String = "n is",
+        sample: Option<f64> = "n at 413.3 nm",
+        n: f64 = "n",
+        k: f64 = "k",
+        worst: f64 = "greatest relative error (%)",
+        published: Option<f64> = "published: greatest relative error (%)",
+    }
+}
+
 /// What was found.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
     errors: Vec<Row>,
     headlines: Vec<Headline>,
+    gold: Vec<Gold>,
+    dips: Dips,
+    rescaling: Rescaling,
     points: Vec<Point>,
     devices: Vec<Device>,
 }
@@ -123,6 +149,12 @@ const OF_HEADLINES: &[Criterion<Headline>] = &[Criterion::each(
     Bound::AtMost(0.0),
     |row: &Headline| (row.least - row.worst).max(row.worst - row.most).into(),
 )];
+const OF_GOLD: &[Criterion<Gold>] = &[Criterion::each(
+    "the published error of gold at 435 nm is that of another index: percentage points between them",
+    Bound::AtMost(POINTS),
+    |row: &Gold| (row.worst - row.published.unwrap_or(f64::NAN)).abs().into(),
+)
+.among(|row| row.published.is_some())];
 const OF_DEVICES: &[Criterion<Device>] = &[Criterion::each(
     "single precision does not add to the error: the greatest difference",
     Bound::AtMost(1e-6),
@@ -299,6 +331,33 @@ fn headline(rows: &[Row], metal: &str, [least, most]: [f64; 2], stated: f64) -> 
     }
 }
 
+/// Gold at 435 nm with the index of the table, with the published one, and with that of a table that is off by a digit.
+fn gold(steps: u32) -> Vec<Gold> {
+    let [n, k] = metals::spectrum("gold-hagemann").map_or(DISPUTED_INDEX, |spectrum| spectrum.at(DISPUTED));
+    let [[before, sample], [after, next]] = ABOUT_DISPUTED;
+    let share = (DISPUTED - before) / (after - before);
+    let other = OTHER_DIGIT + share * (next - OTHER_DIGIT);
+    [
+        ("interpolated in the table", Some(sample), [n, k], None),
+        ("published", None, DISPUTED_INDEX, Some(DISPUTED_ERROR)),
+        (
+            "interpolated in a table with another digit",
+            Some(OTHER_DIGIT),
+            [other, k],
+            Some(DISPUTED_ERROR),
+        ),
+    ]
+    .map(|(source, sample, [n, k], published)| Gold {
+        source: source.into(),
+        sample,
+        n,
+        k,
+        worst: 100.0 * FormError::of(Way::Form(FresnelForm::Rescaled), n, k, steps).worst,
+        published,
+    })
+    .into()
+}
+
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let steps = context.pick(STEPS, 2000);
@@ -325,6 +384,9 @@ impl Study for Found {
         Ok(Self {
             errors,
             headlines: headlines.into(),
+            gold: gold(steps),
+            dips: Dips::measure(context),
+            rescaling: Rescaling::measure(context),
             points: [points("aluminium", 700.0), points("gold", 550.0)].concat(),
             devices: device(context)?,
         })
@@ -354,7 +416,12 @@ impl Study for Found {
                  curve takes the best of none, the rule where its guard lets it pass, and a fit. Schlick's curve has no k.",
             )
             .and(Findings::of(&self.headlines, OF_HEADLINES).note(
-                "The thesis states about 2, 6, 5 and 18 % without its constants; bands are those that published data sets give.",
+                "The thesis states about 2, 6, 5 and 18 % without its constants; bands are those that published data sets give. The band of gold ends at 9 % \
+                 since its blue was published to be 8.60 % off by these constants, which is that of another index: see the table below.",
+            ))
+            .and(Findings::of(&self.gold, OF_GOLD).note(
+                "The table has n = 1.950 at 413.3 nm and 1.862 at 442.8 nm, so that n is 1.885 at 435 nm and the error 9.04 %. The published index is what 1.850 in \
+                 place of 1.950 gives, to its last digit; the published extinction is that of the table. So the difference is one of a digit in the sample, not one of the curve.",
             ))
             .and(Findings::of(&self.devices, OF_DEVICES).note(
                 "Three wavelengths of eight metals; the f64 forms are given the same numbers of single precision. The table holds the factor over \
@@ -363,5 +430,7 @@ impl Study for Found {
             .and(Findings::of(&self.points, &[]).long())
             .curves("aluminium", "Errors for aluminium at 700 nm", axes, curves(&of_metal("aluminium"), |p| p.form.clone(), at))
             .curves("gold", "Errors for gold at 550 nm", axes, curves(&of_metal("gold"), |p| p.form.clone(), at))
+            .and(self.dips.findings())
+            .and(self.rescaling.findings())
     }
 }
