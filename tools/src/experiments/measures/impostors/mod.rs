@@ -12,6 +12,8 @@ pub mod impostor_methods;
 pub mod impostor_motion;
 pub mod impostor_occlusion;
 pub mod impostor_roots;
+mod lit_spheres;
+mod mirrored_rooms;
 mod moving_pictures;
 pub mod search_times;
 pub mod virtual_images;
