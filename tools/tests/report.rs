@@ -115,7 +115,8 @@ fn default_start() -> Result<u64, Box<dyn std::error::Error>> {
 #[test]
 fn the_files_are_complete_and_the_page_loads_nothing() -> Tested {
     let bench = Bench::new()?;
-    bench.measured(&format!("{TEXT}{CRITERION}"), 4, 0)?;
+    let text = TEXT.replace("repeats = 2", "repeats = 2\nstrips = [\"independent\"]");
+    bench.measured(&format!("{text}{CRITERION}"), 4, 0)?;
     let out = bench.out();
     let page = read(&out.join("index.html"))?;
     assert_eq!(page.matches("<svg").count(), 3);
@@ -135,6 +136,8 @@ fn the_files_are_complete_and_the_page_loads_nothing() -> Tested {
     }
     let strip = image::open(out.join("strips/cornell-box.png"))?;
     assert_eq!((strip.width(), strip.height()), (16 * 2 + 4, 16 * 3 + 8));
+    let kept = image::open(out.join("cornell-box-strip.png"))?;
+    assert_eq!((kept.width(), kept.height()), (16 * 2 + 4, 16 * 2 + 4));
     assert!(read(&out.join("report.md"))?.contains("Slopes and time to equal error"));
     for head in ["report.md", "index.html"] {
         let text = read(&out.join(head))?;

@@ -8,7 +8,8 @@ use clerestory::film::{Picture, compare};
 use clerestory::{Error, Result};
 use image::ImageEncoder;
 
-use super::results::SceneResults;
+use super::reference::{short_name, slug};
+use super::results::{SceneResults, VariantResults};
 
 /// Pixels between the pictures of a strip.
 const GAP: u32 = 4;
@@ -39,11 +40,58 @@ pub struct Strip {
     pub columns: Vec<Column>,
 }
 
-/// The strip of a scene; `None` of results that were read back, which have no pictures.
+/// The strip of a scene with all of its variants; `None` of results that were read back, which have no pictures.
 ///
 /// # Errors
 /// [`Error::Picture`] for pictures that do not fit each other.
 pub fn of(results: &SceneResults) -> Result<Option<Strip>> {
+    among(results, |_| true)
+}
+
+/// The strip of a scene with those of its variants that a page of results keeps, by name; `None` without any, and of results that were read back.
+///
+/// # Errors
+/// As [`of`].
+pub fn kept(results: &SceneResults, names: &[String]) -> Result<Option<Strip>> {
+    let strip = among(results, |variant| names.contains(&variant.name))?;
+    Ok(strip.filter(|strip| !strip.columns.is_empty()))
+}
+
+/// The file of [`kept`], in the experiment's folder.
+pub fn file(results: &SceneResults) -> String {
+    format!("{}-strip.png", slug(&results.address))
+}
+
+/// What [`kept`] shows, in words, of results that were read back too; `None` where it has no variant. Its full colour is the greatest of the errors that the
+/// measurements of its pictures hold.
+pub fn words(results: &SceneResults, names: &[String]) -> Option<String> {
+    let shown = results.variants.iter().filter(|variant| names.contains(&variant.name));
+    let measured = shown.filter_map(|variant| {
+        let picture = variant.points.last()?.measurements.first()?;
+        Some((variant.name.as_str(), picture.quantile_999 as f32))
+    });
+    let (shown, errors): (Vec<&str>, Vec<f32>) = measured.unzip();
+    (!shown.is_empty()).then(|| {
+        format!(
+            "{}, from the left: reference, {}; below them, red too bright and blue too dark: full colour is a difference of radiance of {:.3e}",
+            short_name(&results.address),
+            shown.join(", "),
+            full_scale(errors)
+        )
+    })
+}
+
+/// The radiance difference that is full colour, of the pictures' greatest errors: one scale for all, so that the variants can be compared by eye.
+fn full_scale(errors: impl IntoIterator<Item = f32>) -> f32 {
+    let greatest = errors.into_iter().fold(0.0, f32::max);
+    if greatest > 0.0 && greatest.is_finite() {
+        greatest
+    } else {
+        1.0
+    }
+}
+
+fn among(results: &SceneResults, is_shown: impl Fn(&VariantResults) -> bool) -> Result<Option<Strip>> {
     let Some(reference) = &results.reference_picture else {
         return Ok(None);
     };
@@ -53,19 +101,16 @@ pub fn of(results: &SceneResults) -> Result<Option<Strip>> {
         ..CompareOptions::default()
     };
     let shown = |picture: &Picture| Ok::<_, Error>(png::tone_mapped(picture.main_layer()?, picture.width(), &tone));
-    let pictures = || {
-        let all = results.variants.iter();
-        all.filter_map(|variant| Some((&variant.name, variant.picture.as_ref()?)))
-    };
-    // One scale for all, so that the variants can be compared by eye.
-    let mut full_scale = 0.0f32;
-    for (_, picture) in pictures() {
-        full_scale = full_scale.max(compare(picture, reference, &options)?.quantile_999 as f32);
+    let variants = results.variants.iter().filter(|variant| is_shown(variant));
+    let pictures: Vec<(&String, &Picture)> = variants
+        .filter_map(|variant| Some((&variant.name, variant.picture.as_ref()?)))
+        .collect();
+    let mut errors = Vec::new();
+    for (_, picture) in &pictures {
+        errors.push(compare(picture, reference, &options)?.quantile_999 as f32);
     }
-    if !(full_scale > 0.0 && full_scale.is_finite()) {
-        full_scale = 1.0;
-    }
-    let columns = pictures().map(|(name, picture)| {
+    let full_scale = full_scale(errors);
+    let columns = pictures.into_iter().map(|(name, picture)| {
         let flip = flip_map(picture, reference, &options)?;
         Ok(Column {
             name: name.clone(),
@@ -89,8 +134,19 @@ pub fn of(results: &SceneResults) -> Result<Option<Strip>> {
 impl Strip {
     /// All in one picture: a column for the reference and each variant; rows for pictures, differences and FLIP errors.
     pub fn composed(&self) -> Rgb8 {
+        self.in_rows(|column| vec![&column.picture, &column.difference, &column.flip])
+    }
+
+    /// As [`Strip::composed`], without FLIP errors.
+    pub fn of_differences(&self) -> Rgb8 {
+        self.in_rows(|column| vec![&column.picture, &column.difference])
+    }
+
+    /// The reference, and the rows of each variant, from the top.
+    fn in_rows(&self, rows: impl Fn(&Column) -> Vec<&Rgb8>) -> Rgb8 {
         let (width, height) = (self.reference.width, self.reference.height);
-        let (across, down) = (self.columns.len() as u32 + 1, 3);
+        let across = self.columns.len() as u32 + 1;
+        let down = self.columns.first().map_or(1, |column| rows(column).len() as u32);
         let mut whole = Rgb8 {
             width: across * width + (across - 1) * GAP,
             height: down * height + (down - 1) * GAP,
@@ -100,11 +156,8 @@ impl Strip {
         place(&mut whole, &self.reference, 0, 0);
         for (index, column) in self.columns.iter().enumerate() {
             let x = (index as u32 + 1) * (width + GAP);
-            for (row, picture) in [&column.picture, &column.difference, &column.flip]
-                .into_iter()
-                .enumerate()
-            {
-                place(&mut whole, picture, x, row as u32 * (height + GAP));
+            for (row, picture) in (0..).zip(rows(column)) {
+                place(&mut whole, picture, x, row * (height + GAP));
             }
         }
         whole
@@ -170,6 +223,33 @@ mod tests {
         assert_eq!(at(2 * (2 + GAP) + 1, 1 + GAP), [255, 0, 0]);
         assert_eq!(at(0, 2 + 2 * GAP), [255; 3], "nothing below the reference");
         assert!(png_bytes(&whole, Path::new("strip")).unwrap().starts_with(b"\x89PNG"));
+    }
+
+    #[test]
+    fn a_page_of_results_keeps_named_variants_and_says_the_same_without_their_pictures() {
+        let mut scene = made_up_scene();
+        for variant in &mut scene.variants {
+            variant.points[2].measurements[0].quantile_999 = 0.25;
+        }
+        let names = ["slow".to_owned()];
+        let strip = kept(&scene, &names).unwrap().unwrap();
+        assert_eq!((strip.columns.len(), strip.full_scale), (1, 0.25));
+        let whole = strip.of_differences();
+        assert_eq!((whole.width, whole.height), (2 * 2 + GAP, 2 + GAP));
+        assert_eq!(file(&scene), "ring-strip.png");
+        let with_pictures = words(&scene, &names).unwrap();
+        assert!(
+            with_pictures.contains("reference, slow;") && with_pictures.contains("2.500e-1"),
+            "{with_pictures}"
+        );
+        scene.reference_picture = None;
+        for variant in &mut scene.variants {
+            variant.picture = None;
+        }
+        assert_eq!(words(&scene, &names), Some(with_pictures));
+        assert_eq!(kept(&scene, &names).unwrap(), None);
+        assert_eq!(words(&scene, &[]), None);
+        assert_eq!(kept(&made_up_scene(), &[]).unwrap(), None);
     }
 
     #[test]

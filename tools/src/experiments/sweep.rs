@@ -13,6 +13,7 @@
 //! spp = [4, 16, 64]               # samples per pixel, rising; or seconds = [0.1, 0.4, 1.6], time budgets
 //! repeats = 5                     # pictures per budget, with seeds of their own; default 5
 //! seed = 0                        # of the first repeat; the others follow it; default 0
+//! strips = ["from bounce 3"]      # variants whose pictures and differences its page of results keeps; default none
 //!
 //! [sweep.reference]
 //! spp = 4096                      # samples per pixel; 16 times the most of a variant leaves its noise below 1/16 of their MSE
@@ -97,6 +98,9 @@ pub struct Sweep {
     pub seed: u32,
     /// The converged picture.
     pub reference: ReferencePlan,
+    /// Variants whose pictures of the greatest budget the page of results keeps, by name, beside the reference and with signed differences below.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub strips: Vec<String>,
     /// What is compared.
     #[serde(rename = "variant")]
     pub variants: Vec<Variant>,
@@ -296,6 +300,10 @@ impl Sweep {
                 &self.settings(&variant.technique, &variant.settings)?,
             )?;
         }
+        let is_variant = |name: &&String| self.variants.iter().any(|variant| variant.name == **name);
+        if let Some(name) = self.strips.iter().find(|name| !is_variant(name)) {
+            return Err(wrong("strips", name, "is no variant of the sweep"));
+        }
         let reference = self.reference_settings()?;
         self.allowed(&self.reference.technique, &reference)?;
         if let Some(sampler) = reference.get("sampler").filter(|sampler| **sampler != INDEPENDENT) {
@@ -412,6 +420,7 @@ mod tests {
             ("name = \"b\"", "name = \"a\"", "twice"),
             ("name = \"b\"", "name = \"b\"\ntechnique = \"magic\"", "magic"),
             ("1024", "1", "reference.spp"),
+            ("spp = [4, 16]", "spp = [4]\nstrips = [\"c\"]", "no variant"),
             (
                 "spp = 1024",
                 "spp = 1024, settings = { sampler = \"sobol\" }",

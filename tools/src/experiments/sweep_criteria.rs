@@ -27,7 +27,7 @@ use super::results::Results;
 use super::scene_numbers::Scene;
 use super::series::{SceneSeries, Work};
 use super::sweep::{Budget, Sweep};
-use super::{summary, web_page};
+use super::{strip, summary, web_page};
 
 /// The first criterion of every sweep. Errors leave out what is not finite, so that a variant with such pixels would look better than one without.
 pub const FINITE: &str = "no sample or pixel is NaN or infinite";
@@ -451,10 +451,13 @@ pub fn findings(experiment: &Experiment, results: &Results, scenes: &[SceneSerie
             },
         );
     }
-    for scene in scenes {
+    for (scene, of_scene) in scenes.iter().zip(&results.scenes) {
         let axes = Axes::falling(Work::Seconds.label(), web_page::ERROR);
         let curves = web_page::curves_of(scene, Work::Seconds);
         found = found.curves(&format!("{}-time", slug(&scene.address)), &scene.address, axes, curves);
+        if let Some(words) = strip::words(of_scene, &results.sweep.strips) {
+            found = found.picture(&strip::file(of_scene), &words);
+        }
     }
     if results.smoke { found.of_smoke_run() } else { found }
 }
@@ -646,13 +649,16 @@ mod tests {
     #[test]
     fn results_that_were_read_back_say_the_same() {
         let experiment = super::super::parse("x", EXPERIMENT).unwrap();
-        let results = made_up_results();
+        let mut results = made_up_results();
+        results.sweep.strips = vec!["slow".into()];
         let text = serde_json::to_string(&results).unwrap();
         let read: Results = serde_json::from_str(&text).unwrap();
         assert_eq!(text, serde_json::to_string(&read).unwrap());
         assert!(!text.contains("kernels") && read.scenes[0].reference_picture.is_none());
         let of = |results: &Results| findings(&experiment, results, &series::of(results));
-        assert_eq!(of(&results), of(&read));
+        let found = of(&results);
+        assert!(found.plots.len() == 2 && found.plots[1].is_file());
+        assert_eq!(found, of(&read));
         let older = text.replacen("\"smoke\"", "\"expected_slope\":null,\"smoke\"", 1);
         assert!(serde_json::from_str::<Results>(&older).is_err());
     }

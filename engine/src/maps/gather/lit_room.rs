@@ -23,9 +23,6 @@ pub struct LitRoom {
     pub patch_at: [f64; 3],
 }
 
-/// Radius of the sphere whose points are lit.
-const RADIUS: f64 = 0.15;
-
 impl LitRoom {
     /// With the radiances of the published figures.
     pub const PUBLISHED: Self = Self {
@@ -47,6 +44,9 @@ impl LitRoom {
         DVec3::new(0.5, -0.5, 0.3),
         DVec3::new(0.8, -0.8, 0.8),
     ];
+
+    /// Radius of the spheres whose points are lit.
+    pub const RADIUS: f64 = 0.15;
 
     /// Radiance of the wall that is seen in a direction from the middle.
     pub fn radiance(&self, direction: DVec3) -> f64 {
@@ -113,7 +113,7 @@ impl LitRoom {
             let (s, c) = (golden * f64::from(i)).sin_cos();
             let axis = DVec3::new(c, s, 0.0) * (1.0 - z * z).sqrt() + z * DVec3::Z;
             GatherPoint {
-                position: place + RADIUS * axis,
+                position: place + Self::RADIUS * axis,
                 axis,
             }
         };

@@ -160,6 +160,11 @@ impl ShinySphere {
     /// What the camera's rays become at the sphere, by the middles of `side`² pixels of a square that just holds it, for pixels that show
     /// it: mirrored ones, or refracted ones into a body with so many times the index of what surrounds it.
     pub fn rays(&self, side: u32, index: Option<f64>) -> Vec<ImpostorRay> {
+        self.pixels(side, index).into_iter().flatten().collect()
+    }
+
+    /// The same of all pixels, row by row from below; `None` for those that do not show it.
+    pub fn pixels(&self, side: u32, index: Option<f64>) -> Vec<Option<ImpostorRay>> {
         let to_centre = self.centre - self.camera;
         let forward = to_centre.normalize();
         let right = forward.cross(DVec3::Y).normalize();
@@ -181,6 +186,6 @@ impl ShinySphere {
             };
             Some(ImpostorRay { origin, direction })
         };
-        pixels.filter_map(ray).collect()
+        pixels.map(ray).collect()
     }
 }

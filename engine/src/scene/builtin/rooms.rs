@@ -14,6 +14,9 @@ use super::textures::{checker, plain};
 use crate::Result;
 use crate::scene::{Camera, Filter, LightKind, Material, Scene, metals};
 
+/// What a sphere may be made of.
+const METALS: &[&str] = &["gold", "silver", "copper", "aluminium", "mirror", "none"];
+
 pub const BOX_ROOM: Entry = Entry {
     name: "box-room",
     summary: "A furnished closed room of 6 × 3 × 6 m with one mirror wall: 804 triangles.",
@@ -37,6 +40,19 @@ pub const BOX_ROOM: Entry = Entry {
             0.0,
             1e6,
             "radiance of the panel, or intensity of the point light",
+        ),
+        Parameter::choice(
+            "object",
+            "none",
+            METALS,
+            "metal of a sphere of radius 0.4 m beside the furniture",
+        ),
+        Parameter::real(
+            "place",
+            "0",
+            0.0,
+            1.0,
+            "share of the sphere's way from (3, 1.2, 4) into the corner at (0.7, 1.2, 5.3)",
         ),
     ],
     build: box_room,
@@ -62,14 +78,28 @@ pub const DIVIDER_ROOM: Entry = Entry {
     summary: "A checkered cubic room with a divider wall and a metal sphere: occlusion that reflections must see.",
     parameters: &[
         Parameter::choice("divider", "yes", &["yes", "no"], "whether the divider stands"),
-        Parameter::choice(
-            "object",
-            "gold",
-            &["gold", "silver", "copper", "aluminium", "mirror", "none"],
-            "metal of the sphere",
-        ),
+        Parameter::choice("object", "gold", METALS, "metal of the sphere"),
         Parameter::real("roughness", "0", 0.0, 1.0, "perceptual roughness of the sphere"),
-        Parameter::color("light", "10", 0.0, 1e6, "radiance of the ceiling panel, W·m⁻²·sr⁻¹"),
+        Parameter::real(
+            "place",
+            "0",
+            0.0,
+            1.0,
+            "share of the sphere's way from (0.3, -1, 0.9) before the divider to (1.3, -1, 0.3) beside its end",
+        ),
+        Parameter::choice(
+            "source",
+            "area",
+            &["area", "point"],
+            "a ceiling panel, or a point light at (0, 1.6, 0), above the divider",
+        ),
+        Parameter::color(
+            "light",
+            "10",
+            0.0,
+            1e6,
+            "radiance of the panel, W·m⁻²·sr⁻¹, or intensity of the point light, W·sr⁻¹",
+        ),
     ],
     build: divider_room,
 };
@@ -93,6 +123,33 @@ fn panel(scene: &mut Scene, radiance: Vec3, middle: Vec3, half: Vec2) {
     );
 }
 
+/// A point light.
+fn lamp(scene: &mut Scene, position: Vec3, intensity: Vec3) {
+    scene.add_light("lamp", LightKind::Point { position, intensity });
+}
+
+/// The sphere of the parameters `object` and `place`, somewhere on a way: metal of this perceptual roughness.
+fn metal_sphere(
+    scene: &mut Scene,
+    values: &Values,
+    [from, to]: [Vec3; 2],
+    (radius, roughness): (f64, f32),
+) -> Result<()> {
+    let object = values.word("object")?;
+    if object == "none" {
+        return Ok(());
+    }
+    let metal = scene.add_material(Material {
+        conductor: metals::by_name(object),
+        roughness,
+        ..Material::mirror(object, Vec3::ONE)
+    });
+    let middle = from + values.real("place")? as f32 * (to - from);
+    let ball = lat_long_sphere("object", metal, radius, 96, 48);
+    scene.place(MeshBuilder::new("object", metal).append(&ball, |p| p + middle).build());
+    Ok(())
+}
+
 fn box_room(values: &Values) -> Result<Scene> {
     let size = Vec3::new(6.0, 3.0, 6.0);
     let mut scene = Scene::default();
@@ -113,13 +170,7 @@ fn box_room(values: &Values) -> Result<Scene> {
     if values.word("source")? == "area" {
         panel(&mut scene, light, Vec3::new(3.0, 2.98, 3.0), Vec2::splat(0.6));
     } else {
-        scene.add_light(
-            "lamp",
-            LightKind::Point {
-                position: Vec3::new(3.0, 2.5, 3.0),
-                intensity: light,
-            },
-        );
+        lamp(&mut scene, Vec3::new(3.0, 2.5, 3.0), light);
     }
     if values.word("contents")? == "furnished" {
         // A finger's breadth above the floor, so that no two faces coincide.
@@ -142,6 +193,8 @@ fn box_room(values: &Values) -> Result<Scene> {
         placed.append(&globe, |p| p + Vec3::new(2.8, 1.02, 2.5));
         scene.place(placed.build());
     }
+    let way = [Vec3::new(3.0, 1.2, 4.0), Vec3::new(0.7, 1.2, 5.3)];
+    metal_sphere(&mut scene, values, way, (0.4, 0.0))?;
     scene.cameras.push(Camera::look_at(
         "main",
         DVec3::new(5.4, 1.7, 5.5),
@@ -257,26 +310,14 @@ fn divider_room(values: &Values) -> Result<Scene> {
             .build();
         scene.place(divider);
     }
-    let object = values.word("object")?;
-    if object != "none" {
-        let metal = scene.add_material(Material {
-            conductor: metals::by_name(object),
-            roughness: values.real("roughness")? as f32,
-            ..Material::mirror(object, Vec3::ONE)
-        });
-        let ball = lat_long_sphere("object", metal, 0.6, 96, 48);
-        scene.place(
-            MeshBuilder::new("object", metal)
-                .append(&ball, |p| p + Vec3::new(0.3, -1.0, 0.9))
-                .build(),
-        );
+    let way = [Vec3::new(0.3, -1.0, 0.9), Vec3::new(1.3, -1.0, 0.3)];
+    metal_sphere(&mut scene, values, way, (0.6, values.real("roughness")? as f32))?;
+    let light = values.color("light")?;
+    if values.word("source")? == "area" {
+        panel(&mut scene, light, Vec3::new(0.0, 1.98, -0.6), Vec2::new(0.7, 0.7));
+    } else {
+        lamp(&mut scene, Vec3::new(0.0, 1.6, 0.0), light);
     }
-    panel(
-        &mut scene,
-        values.color("light")?,
-        Vec3::new(0.0, 1.98, -0.6),
-        Vec2::new(0.7, 0.7),
-    );
     scene.cameras.push(Camera::look_at(
         "main",
         DVec3::new(1.7, 0.5, 1.9),
@@ -323,6 +364,56 @@ mod tests {
             |query: &str| SceneProfile::of(&generate(&format!("builtin:passage?{query}")).expect("scene")).media;
         assert!(media("sigma_s=0.5&g=0.6").surrounding && media("sigma_s=0.5&g=0.6").phases.henyey_greenstein);
         assert!(!media("g=0.6").any());
+    }
+
+    #[test]
+    fn spheres_move_clear_of_walls_and_furniture() {
+        // Rooms, their walls, and what stands below or beside the way.
+        let v = DVec3::new;
+        let rooms = [
+            (
+                "builtin:divider-room?source=point",
+                [v(-2.0, -2.0, -2.0), v(2.0, 2.0, 2.0)],
+                [v(-1.99, -1.99, -0.05), v(0.4, 0.6, 0.05)],
+                [v(0.3, -1.0, 0.9), v(1.3, -1.0, 0.3)],
+            ),
+            (
+                "builtin:box-room?source=point&mirror=no&object=mirror",
+                [v(0.0, 0.0, 0.0), v(6.0, 3.0, 6.0)],
+                [v(1.0, 0.0, 3.8), v(1.5, 0.5, 4.3)],
+                [v(3.0, 1.2, 4.0), v(0.7, 1.2, 5.3)],
+            ),
+        ];
+        for (room, walls, obstacle, [from, to]) in rooms {
+            for place in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                let scene = generate(&format!("{room}&place={place}")).expect("scene");
+                assert!(scene.lights.len() == 1 && !scene.meshes.iter().any(|mesh| mesh.name == "light"));
+                let object = scene
+                    .meshes
+                    .iter()
+                    .find(|mesh| mesh.name == "object")
+                    .expect("a sphere");
+                let [low, high] = object.bounds().map(|corner| corner.as_dvec3());
+                let (middle, radius) = (low.midpoint(high), (high.y - low.y) / 2.0);
+                // Corners are f32.
+                assert!(
+                    middle.distance(from.lerp(to, place)) < 1e-5,
+                    "{room}, {place}: {middle}"
+                );
+                assert!(
+                    low.cmpgt(walls[0]).all() && high.cmplt(walls[1]).all(),
+                    "{room}, {place}"
+                );
+                let nearest = middle.clamp(obstacle[0], obstacle[1]);
+                assert!(middle.distance(nearest) > radius, "{room}, {place}: {nearest}");
+            }
+        }
+        let names = |address: &str| -> Vec<String> {
+            let scene = generate(address).expect("scene");
+            scene.meshes.into_iter().map(|mesh| mesh.name).collect()
+        };
+        assert!(!names("builtin:box-room").contains(&"object".to_owned()));
+        assert!(names("builtin:divider-room").contains(&"light".to_owned()));
     }
 
     #[test]

@@ -118,6 +118,13 @@ pub fn sweep(experiment: &Experiment, results: &Results) -> Outcome<(String, Vec
             files.push(NamedFile::new(format!("{STRIPS}/{name}.png"), strip));
         }
     }
+    for scene in &results.scenes {
+        if let Some(kept) = strip::kept(scene, &results.sweep.strips)? {
+            let file = strip::file(scene);
+            let picture = png::to_bytes(&kept.of_differences(), &file)?;
+            files.push(NamedFile::new(file, picture));
+        }
+    }
     let verdicts = verdicts_first(&findings);
     let text = summary::markdown(results, &scenes);
     let page = format!(

@@ -14,7 +14,6 @@ use std::time::Instant;
 use clap::Args;
 use clerestory::gpu::Gpu;
 use clerestory::{Error, Result, scene};
-use clerestory_tools::experiments::findings::Findings;
 use clerestory_tools::experiments::kept_rows;
 use clerestory_tools::experiments::measures::{self, Context};
 use clerestory_tools::experiments::pages::{self, Stored};
@@ -239,7 +238,7 @@ fn measure(arguments: &Arguments, experiment: &Experiment, name: &str, places: &
     if let Some(results) = &places.results {
         let run = begun.end(clock.elapsed().as_secs_f64(), device.take());
         let found = serde_json::from_str(&rows).map_err(|cause| Error::setting("rows", name, cause.to_string()))?;
-        written.push(results.keep(experiment, &Stored { run, found }, &folder, &findings)?);
+        written.push(results.keep(experiment, &Stored { run, found }, &folder)?);
     }
     Written::check_all(written)?;
     kept_rows::forget(&folder)?;
@@ -307,7 +306,7 @@ fn render(
         let found = serde_json::to_value(&results)
             .map_err(|cause| Error::setting("results", &experiment.name, cause.to_string()))?;
         let stored = Stored { run, found };
-        written.push(kept.keep(experiment, &stored, &of_sweep.folder, &Findings::default())?);
+        written.push(kept.keep(experiment, &stored, &of_sweep.folder)?);
     }
     Written::check_all(written)?;
     printed?;

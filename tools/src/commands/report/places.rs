@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clerestory::input::read_file;
 use clerestory::{Error, Result};
 use clerestory_tools::experiments::Experiment;
-use clerestory_tools::experiments::findings::Findings;
 use clerestory_tools::experiments::pages::{self, File, Page, Stored};
 
 use super::{Arguments, files, folder};
@@ -71,10 +70,11 @@ impl KeptResults {
     }
 
     /// Keeps what was found, with the pictures that the run wrote into a folder of its own.
-    pub fn keep(&self, experiment: &Experiment, stored: &Stored, from: &Path, findings: &Findings) -> Outcome<Written> {
+    pub fn keep(&self, experiment: &Experiment, stored: &Stored, from: &Path) -> Outcome<Written> {
         let texts = pages::of_run(experiment, stored)?.into_iter();
         let mut files: Vec<NamedFile> = texts.map(|File { name, text }| NamedFile::new(name, text)).collect();
-        for plot in findings.plots.iter().filter(|plot| plot.is_file()) {
+        let found = pages::findings(experiment, Some(stored))?;
+        for plot in found.plots.iter().filter(|plot| plot.is_file()) {
             match read_file(&from.join(&plot.file), MOST_BYTES) {
                 Ok(picture) => files.push(NamedFile::new(plot.file.clone(), picture)),
                 Err(cause) => output::warn(&format!("a picture is left out of the results: {cause}")),

@@ -126,7 +126,7 @@ measures! {
     on_device "gather-terms" impostors::gather_terms;
     on_device "imperfect-maps" preview::imperfect_maps;
     on_device "impostor-methods" impostors::impostor_methods;
-    on_host "impostor-motion" impostors::impostor_motion;
+    on_device "impostor-motion" impostors::impostor_motion;
     on_host "impostor-occlusion" impostors::impostor_occlusion;
     on_host "impostor-roots" impostors::impostor_roots;
     on_device "impostor-trace" impostors::impostor_trace;

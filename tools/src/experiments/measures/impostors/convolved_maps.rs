@@ -194,7 +194,7 @@ fn statistics(map: &MapImage) -> [f64; 2] {
 }
 
 /// All faces beside each other in one square of rows and columns: +x, −x, +y above, −y, +z, −z in the middle.
-fn unfolded(map: &MapImage, brightest: f64) -> Vec<DVec3> {
+pub(super) fn unfolded(map: &MapImage, brightest: f64) -> Vec<DVec3> {
     let side = map.size().x;
     let whole = 3 * side;
     let at = |i: u32| {

@@ -2,13 +2,22 @@
 //!
 //! Oracle: the counts that sizes and settings say. Counters are the technique's own.
 
+use std::f64::consts::TAU;
+
 use clerestory::Result;
+use clerestory::maps::gather::lit_room::LitRoom;
+use clerestory::maps::gather::{SolidAngleForm, gather_solid_angle};
+use clerestory::maps::impostor::room::BoxRoom;
+use clerestory::maps::{MapImage, Parametrization};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene;
+use glam::{DVec3, UVec2};
 use serde_json::json;
 
+use super::convolved_maps::unfolded;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, rows};
 use crate::experiments::measures::Context;
+use crate::metal_forms::sheet;
 
 const SCENE: &str = "builtin:box-room?source=point&mirror=no&contents=empty";
 /// Lights along a side of the octahedron.
@@ -16,6 +25,16 @@ const LIGHTS: [u32; 4] = [8, 16, 32, 64];
 /// Texels along a side of the map, and paths of each.
 const SIDE: u32 = 128;
 const SAMPLES: u32 = 4;
+const PICTURE: &str = "lights.png";
+/// Texels along a side of a shown face.
+const FACE: u32 = 42;
+/// Lights along a side of a face that are shown, and about which places: the map's own first.
+const SHOWN: u32 = 4;
+const ABOUT: [DVec3; 3] = [LitRoom::PLACES[0], LitRoom::PLACES[1], LitRoom::PLACES[2]];
+/// Colours of lights' middles, of the rims of their cones, and of the brightest wall.
+const MIDDLE: DVec3 = DVec3::new(1.0, 0.9, 0.1);
+const RIM: DVec3 = DVec3::new(0.8, 0.1, 0.05);
+const WALL: DVec3 = DVec3::splat(0.5);
 
 rows! {
     /// A picture.
@@ -80,9 +99,46 @@ fn row(renderer: &Renderer, lights: u32, [size, side]: [u32; 2]) -> Result<Row> 
     })
 }
 
+/// Unfolded cubes of what is seen about places, with all lights as cones of the solid angles that they have there.
+fn overlays(side: u32) -> Result<Vec<Vec<DVec3>>> {
+    let (room, form) = (LitRoom::PUBLISHED, SolidAngleForm::DiscWithNormals);
+    let lights = room.lights(SHOWN, form)?;
+    let (map, size) = (Parametrization::Cube, UVec2::splat(side));
+    // About the angle that a texel is seen under.
+    let texel_angle = 2.0 / f64::from(side);
+    let overlay = |place: &DVec3| {
+        // Directions to the lights, and half angles of their cones.
+        let cones = lights.lights().iter().filter_map(|light| {
+            let v = light.position - *place;
+            let direction = v.try_normalize()?;
+            let cosine = -light.normal.dot(direction);
+            let solid_angle = gather_solid_angle(form, light.area, v.length_squared(), cosine);
+            Some((direction, (1.0 - solid_angle / TAU).acos()))
+        });
+        let cones: Vec<(DVec3, f64)> = cones.collect();
+        let image = MapImage::from_fn(map, size, |texel| {
+            let direction = map.texel_direction(size, texel).unwrap_or_default();
+            let off = |towards: DVec3| towards.angle_between(direction);
+            if cones.iter().any(|(towards, _)| off(*towards) < texel_angle) {
+                return MIDDLE;
+            }
+            let is_rim = |(towards, cone): &(DVec3, f64)| (off(*towards) - cone).abs() < 0.5 * texel_angle;
+            if cones.iter().any(is_rim) {
+                return RIM;
+            }
+            let hit = *place + BoxRoom::EMPTY.hit(*place, direction) * direction;
+            room.radiance(hit).min(1.0) * WALL
+        })?;
+        Ok(unfolded(&image, 1.0))
+    };
+    ABOUT.iter().map(overlay).collect()
+}
+
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
+        let side = context.pick(FACE, 4);
+        context.picture(PICTURE, &sheet(&overlays(side)?, 3 * side, ABOUT.len() as u32));
         let renderer = Renderer::new(&gpu, &scene::load(SCENE)?)?;
         let sizes = context.pick([64, SIDE], [8, 16]);
         let lights = context.first(&LIGHTS, 1);
@@ -95,11 +151,19 @@ impl Study for Found {
 
     fn findings(&self) -> Findings {
         let default = self.iter().find(|row| row.lights == 32 * 32);
-        Findings::of(self, CRITERIA)
+        let findings = Findings::of(self, CRITERIA)
             .headline(
                 "paths of the map and terms of 32² lights over paths from each point",
                 default.map(|row| Measured::exact(row.share)),
             )
-            .note("A picture of one sample a pixel of an empty room, its map by rays. Paths from each point would be as many as the map's, so that each point had as little noise.")
+            .note("A picture of one sample a pixel of an empty room, its map by rays. Paths from each point would be as many as the map's, so that each point had as little noise.");
+        if self.is_empty() {
+            return findings;
+        }
+        findings.picture(
+            PICTURE,
+            "Lights of 4² texels a face of a lit room, about the map's place, half-way to a wall and near the bright patch: their middles, yellow, and the rims of cones of the solid angles that they have there, \
+             red, over what is seen; faces +x, −x and +y above −y, +z and −z",
+        )
     }
 }

@@ -3,11 +3,14 @@
 //! Oracle: sums over directions of what is seen in them from the points. What was published as a reference, the finest gather, is one of those that are judged here.
 
 use clerestory::Result;
+use clerestory::film::png::Rgb8;
+use clerestory::gpu::Gpu;
 use clerestory::maps::gather::lit_room::{LitRoom, relative_errors};
 use clerestory::maps::gather::{Gather, GatherLights, GatherPoint, GatherSettings, SolidAngleForm};
 use glam::DVec3;
 
 use super::gather_fireballs::{self, Part};
+use super::lit_spheres::{Lit, seen_in_lobes, sheet_of};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, rows};
 use crate::experiments::measures::Context;
 
@@ -19,6 +22,11 @@ const DIRECTIONS: u32 = 96;
 const SIDES: [u32; 4] = [2, 4, 8, 16];
 /// Texels along a face's side of the map at its place.
 pub const CLASSICAL_SIDE: u32 = 32;
+const PICTURE: &str = "glossy.png";
+/// Of the picture: pixels along a side of a tile, and directions of its oracle along the sides of faces.
+const TILE: (u32, u32) = (64, 48);
+/// From where spheres are seen.
+const FROM: DVec3 = DVec3::new(-0.6, 0.2, 1.0);
 
 rows! {
     /// A gather at a place.
@@ -72,6 +80,40 @@ const CRITERIA: &[Criterion<Row>] = &[
     .among(|row| is_middle(row) && row.way == way(16)),
 ];
 
+/// Points at the map's place, with their axes.
+fn at_the_maps_place(points: &[GatherPoint]) -> Vec<GatherPoint> {
+    let moved = |point: &GatherPoint| GatherPoint {
+        position: DVec3::ZERO,
+        ..*point
+    };
+    points.iter().map(moved).collect()
+}
+
+/// Glossy light of points on the device.
+fn gathered(gpu: &Gpu, lights: &GatherLights, points: &[GatherPoint]) -> Result<Vec<f64>> {
+    let found = Gather::new(gpu, lights, &GatherSettings::default(), EXPONENT)?.gather(points)?;
+    Ok(found.into_iter().map(|value| value.x).collect())
+}
+
+/// Glossy spheres at places: the oracle, the map at its place, and gathers of more and more texels.
+fn picture(
+    gpu: &Gpu,
+    room: &LitRoom,
+    places: &[DVec3],
+    (still, lights): (&GatherLights, &[(u32, GatherLights)]),
+    (side, directions): (u32, u32),
+) -> Result<Rgb8> {
+    let views: Vec<_> = places.iter().map(|place| seen_in_lobes(*place, FROM, side)).collect();
+    let mut ways: Vec<Lit<'_>> = vec![
+        Box::new(move |points: &[GatherPoint]| Ok(room.glossy(points, f64::from(EXPONENT), directions))),
+        Box::new(move |points: &[GatherPoint]| gathered(gpu, still, &at_the_maps_place(points))),
+    ];
+    for (_, lights) in lights {
+        ways.push(Box::new(move |points: &[GatherPoint]| gathered(gpu, lights, points)));
+    }
+    sheet_of(&views, &ways, side)
+}
+
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
@@ -84,22 +126,15 @@ impl Study for Found {
             .collect::<Result<_>>()?;
         let still = room.lights(CLASSICAL_SIDE, SolidAngleForm::Disc)?;
         let places = context.first(&LitRoom::PLACES, 1);
+        let shown = picture(&gpu, &room, places, (&still, &lights), context.pick(TILE, (6, 8)))?;
+        context.picture(PICTURE, &shown);
         let spheres = context.each(places, DVec3::to_string, |place| {
             let points = LitRoom::points(*place, count);
             let exact = room.glossy(&points, f64::from(EXPONENT), directions);
             let errors = |lights: &GatherLights, points: &[GatherPoint]| -> Result<[f64; 2]> {
-                let found = Gather::new(&gpu, lights, &GatherSettings::default(), EXPONENT)?.gather(points)?;
-                let found: Vec<f64> = found.into_iter().map(|value| value.x).collect();
-                Ok(relative_errors(&found, &exact))
+                Ok(relative_errors(&gathered(&gpu, lights, points)?, &exact))
             };
-            let at_the_maps_place: Vec<GatherPoint> = points
-                .iter()
-                .map(|point| GatherPoint {
-                    position: DVec3::ZERO,
-                    ..*point
-                })
-                .collect();
-            let classical = errors(&still, &at_the_maps_place)?;
+            let classical = errors(&still, &at_the_maps_place(&points))?;
             let row = |way: String, terms: u32, [rms, bias]: [f64; 2], coarser: Option<f64>| Row {
                 place: place.to_string(),
                 way,
@@ -132,7 +167,7 @@ impl Study for Found {
             .find(|row| row.place == corner && row.way == way(16));
         let drawn = self.spheres.iter().filter(|row| row.way != CLASSICAL);
         let drawn: Vec<Row> = drawn.cloned().collect();
-        Findings::of(&self.spheres, CRITERIA)
+        let findings = Findings::of(&self.spheres, CRITERIA)
             .headline(
                 "in the corner, RMS of sixteen texels a side over that of the map at its place",
                 finest.map(|row| row.of_classical.into()),
@@ -143,7 +178,15 @@ impl Study for Found {
                 "Errors of glossy light by terms",
                 Axes::rates("terms", "RMS (%)"),
                 curves(&drawn, |row| row.place.clone(), |row| (row.terms as f64, row.rms.into())),
+            );
+        let findings = if self.spheres.is_empty() {
+            findings
+        } else {
+            findings.picture(
+                PICTURE,
+                "Glossy spheres of exponent 5 in the middle, half-way to a wall, near the patch and in a corner; from the left sums over directions, the map at its place, and 2², 4², 8² and 16² texels a face with the surfaces' own angles",
             )
-            .and(gather_fireballs::findings(&self.column))
+        };
+        findings.and(gather_fireballs::findings(&self.column))
     }
 }

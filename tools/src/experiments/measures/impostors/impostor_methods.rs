@@ -14,6 +14,7 @@ use clerestory::maps::impostor::{
 use clerestory::maps::{MapImage, Parametrization};
 use glam::DVec3;
 
+use super::mirrored_rooms;
 use super::published_searches::{Figures, Published, SEEN_SHARES, name, searches};
 use super::search_times::{self, Beside, Steps};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
@@ -22,6 +23,8 @@ use crate::experiments::measures::errors::Errors;
 
 /// Pixels along a side of a view of the sphere.
 const SIDE: u32 = 220;
+/// The same of pictures.
+const PICTURED: u32 = 96;
 /// Texels of a cube of 256² a face.
 const TEXELS: f64 = 6.0 * 256.0 * 256.0;
 const TURNS: usize = 5;
@@ -397,6 +400,7 @@ impl Study for Found {
         let mut rows = context.each(&cases, name, |(map, sphere)| {
             searched(context, &gpu, *map, sphere, side, texels)
         })?;
+        mirrored_rooms::draw(context, context.pick(PICTURED, 8), texels)?;
         rows.extend(without_distances(side)?);
         rows.extend(refracted(&gpu, side, texels)?);
         // Pictures a second: 642, 447 and 323 in an empty room; 630, 430, 323 and 108 beside a box.
@@ -429,7 +433,7 @@ impl Study for Found {
         let one = name(&ImpostorSettings::of(SearchMethod::SecantFromGuess, 0), 1);
         let of_b = self.look_ups.iter().filter(|row| row.sphere == "B" && row.way == one);
         let worst = of_b.map(|row| row.mean).reduce(f64::max);
-        Findings::of(&self.look_ups, CRITERIA)
+        let findings = Findings::of(&self.look_ups, CRITERIA)
             .headline("mean error of one step half-way to a wall (°)", worst.map(Measured::exact))
             .note(
                 "A, B and C stand in an empty room, the others beside a box or a pillar; +n is the number of steps after the first guess. Distances are \
@@ -452,6 +456,10 @@ impl Study for Found {
             .note(
                 "Rays of a mirror sphere of one metre about the map's place, in turns by the search and by the index that scenes have by default. The map has one layer with planes, found by rays; errors \
                  are angles at its place against closest hits, and rays whose hit it does not see are among them.",
-            )
+            );
+        if self.look_ups.is_empty() {
+            return findings;
+        }
+        findings.picture(mirrored_rooms::PICTURE, mirrored_rooms::WORDS)
     }
 }

@@ -1,6 +1,6 @@
 //! A mirror sphere that moves while its map stays where it was: errors of look-ups over the way, into the corner of an empty room and beside a box.
 //!
-//! Oracle: exact rays. Distances are exact, too: what is off is the search, and what the map's place does not see.
+//! Oracle: exact rays. Distances are exact, too: what is off is the search, and what the map's place does not see. Pictures of such a sphere stand beside.
 
 use clerestory::Result;
 use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
@@ -8,6 +8,7 @@ use clerestory::maps::impostor::{ImpostorSettings, SearchMethod};
 use glam::DVec3;
 
 use super::exact_room::{errors, mean};
+use super::moving_pictures::{self, Frame};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::greatest;
@@ -40,7 +41,11 @@ rows! {
     }
 }
 /// What was found.
-pub type Found = Vec<Row>;
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Found {
+    look_ups: Vec<Row>,
+    pictures: Vec<Frame>,
+}
 
 const EMPTY: &str = "empty";
 const BOX: &str = "with a box";
@@ -113,7 +118,7 @@ impl Study for Found {
             .flat_map(|room| (0..=steps).map(move |i| (room, i)))
             .collect();
         let name = |(room, i): &(BoxRoom, u32)| format!("{}, place {i}", name_of(*room));
-        context.each(&places, name, |(room, i)| {
+        let look_ups = context.each(&places, name, |(room, i)| {
             let share = f64::from(*i) / f64::from(steps);
             let sphere = ShinySphere {
                 room: *room,
@@ -139,18 +144,24 @@ impl Study for Found {
                 }
             };
             Ok(STAGES.map(row).into())
+        })?;
+        let gpu = (context.gpu)()?;
+        Ok(Self {
+            look_ups,
+            pictures: moving_pictures::moving(context, &gpu)?,
         })
     }
 
     fn findings(&self) -> Findings {
-        let of_room = |room: &str| -> Vec<Row> { self.iter().filter(|row| row.room == room).cloned().collect() };
+        let rows = &self.look_ups;
+        let of_room = |room: &str| -> Vec<Row> { rows.iter().filter(|row| row.room == room).cloned().collect() };
         let axes = Axes::rates("share of the way, and a tenth", "mean error (°)");
         let at = |row: &Row| (row.share + 0.1, row.mean.max(1e-5).into());
         let is_three = |row: &Row| row.room == EMPTY && row.way == way(SearchMethod::FalsePosition, 3);
-        Findings::of(self, CRITERIA)
+        Findings::of(rows, CRITERIA)
             .headline(
                 "the largest mean error of three steps over the way (°)",
-                largest(self, is_three, |row| row.mean),
+                largest(rows, is_three, |row| row.mean),
             )
             .note(
                 "A sphere of radius 0.3 moves from the middle of a room of half width 1, where its map is seen from, to (0.55, −0.6, 0.55), and beside a box to (0.5, −0.2, −0.35); it is seen from one place, and in the empty room the side that is seen is nearest to the map's place after a fifth of the way. Published are the ends of the way in the empty \
@@ -158,6 +169,7 @@ impl Study for Found {
             )
             .curves("empty", "Errors in an empty room", axes, curves(&of_room(EMPTY), |row| row.way.clone(), at))
             .curves("box", "Errors in a room with a box", axes, curves(&of_room(BOX), |row| row.way.clone(), at))
+            .and(moving_pictures::findings(&self.pictures))
     }
 }
 
