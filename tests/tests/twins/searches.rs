@@ -83,6 +83,7 @@ fn run(gpu: &Gpu, method: SearchMethod, function: u32, table: &[Case]) -> Vec<Re
         impostor_steps: of.steps,
         impostor_bisections: of.bisections,
         impostor_layers: LAYERS,
+        impostor_is_open: true,
     };
     twin_search(gpu, &spec, function, table, &BOXES)
 }

@@ -2,6 +2,7 @@
 
 use super::kernels::{quota_of, work};
 use super::settings::BidirectionalSettings;
+use crate::Result;
 use crate::gpu::shaders::constants::LIGHT_VERTEX_QUARTERS;
 use crate::gpu::shaders::sets::BidirectionalSet;
 use crate::gpu::shaders::techniques::bidirectional::{bdpt_add, bdpt_camera, bdpt_splat};
@@ -9,7 +10,6 @@ use crate::gpu::shaders::types::{LightSplat, SplatSum};
 use crate::gpu::{Buffer, Caps, ComputePipeline, Gpu};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::{GpuScene, surface_spec};
-use crate::{Error, Result};
 
 /// Sums are the same bits for up to as many splats.
 const SPLATS_MAX: u64 = 1 << 22;
