@@ -33,6 +33,8 @@ layout(constant_id = 131) const uint IMPOSTOR_STEPS = 3u;
 layout(constant_id = 132) const uint IMPOSTOR_BISECTIONS = 12u;
 // Layers of surfaces.
 layout(constant_id = 133) const uint IMPOSTOR_LAYERS = 1u;
+// Whether there is no surface somewhere; where there is one everywhere, nothing is asked of what a search found but its residual.
+layout(constant_id = 136) const bool IMPOSTOR_IS_OPEN = true;
 
 // What a search found: the direction from the map's place, the ray's length, |1 - g|, and the surface's layer.
 struct ImpostorHit {
@@ -167,7 +169,7 @@ ImpostorHit impostor_search(vec3 x, vec3 r, vec2 extent, float tolerance) {
         float distance = impostor_distance(layer, v);
         // 1 at the map's place itself.
         ImpostorHit hit = ImpostorHit(v, d, abs(1.0 - size / distance), layer);
-        if (size > 0.0 && distance >= IMPOSTOR_NOTHING) {
+        if (IMPOSTOR_IS_OPEN && size > 0.0 && distance >= IMPOSTOR_NOTHING) {
             // The sky in the first layer; in others no further surface.
             hit = ImpostorHit(r, IMPOSTOR_NOTHING, layer == 0u ? 0.0 : 1.0, layer);
         }

@@ -27,8 +27,8 @@ struct ImpostorQuery {
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { ImpostorQuery queries[]; };
 // Radiance, and the distance.
-layout(set = 0, binding = 1, scalar) restrict readonly buffer Texels { vec4 texels[]; };
-layout(set = 0, binding = 2, scalar) restrict readonly buffer Distances { float distances[]; };
+layout(set = 0, binding = 1) uniform textureBuffer texels;
+layout(set = 0, binding = 2) uniform textureBuffer distances;
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer Values { vec3 values[]; };
 
 float impostor_distance(uint layer, vec3 v);
@@ -45,7 +45,7 @@ int impostor_texel(vec3 v) {
 
 float impostor_distance(uint layer, vec3 v) {
     int texel = impostor_texel(v);
-    return IMPOSTOR_PACKED ? texels[texel].w : distances[texel];
+    return IMPOSTOR_PACKED ? texelFetch(texels, texel).w : texelFetch(distances, texel).x;
 }
 
 void main() {
@@ -53,6 +53,6 @@ void main() {
     if (i < push.count) {
         ImpostorQuery query = queries[i];
         ImpostorHit hit = impostor_search(query.origin, query.direction, push.extent, push.tolerance);
-        values[i] = texels[impostor_texel(hit.direction)].rgb;
+        values[i] = texelFetch(texels, impostor_texel(hit.direction)).rgb;
     }
 }

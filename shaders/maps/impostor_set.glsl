@@ -17,27 +17,28 @@ struct ImpostorShape {
 };
 
 layout(set = 1, binding = 0, scalar) restrict readonly buffer ImpostorShapes { ImpostorShape impostor_shapes[]; };
-// Layer of surfaces by layer, each layer by layer of the map, row by row.
-layout(set = 1, binding = 1, scalar) restrict readonly buffer ImpostorDistances { float impostor_distances[]; };
-layout(set = 1, binding = 2, scalar) restrict readonly buffer ImpostorNormals { uint impostor_normals[]; };
+// Layer of surfaces by layer, each layer by layer of the map, row by row: the distance, and the normal where there are normals.
+layout(set = 1, binding = 1) uniform utextureBuffer impostor_texels;
 
 float impostor_distance(uint layer, vec3 v);
 
 #include "maps/impostor.glsl"
 
+// Read once, for all steps.
+ivec2 impostor_size = impostor_shapes[0].size;
+
 float impostor_distance(uint layer, vec3 v) {
     uint face;
-    ivec2 size = impostor_shapes[0].size;
     vec2 uv = directional_encode(v, face);
-    ivec2 p = clamp(ivec2(uv * vec2(size)), ivec2(0), size - 1);
+    ivec2 p = clamp(ivec2(uv * vec2(impostor_size)), ivec2(0), impostor_size - 1);
     bool is_cube = DIRECTIONAL_KIND == DIRECTIONAL_CUBE;
-    int row = int(layer * (is_cube ? CUBE_FACES : 1u) + face) * size.y + p.y;
-    int texel = row * size.x + p.x;
-    float distance = impostor_distances[texel];
-    if (IMPOSTOR_PLANES && distance < IMPOSTOR_NOTHING) {
-        vec2 centre = (vec2(p) + 0.5) / vec2(size);
+    int row = int(layer * (is_cube ? CUBE_FACES : 1u) + face) * impostor_size.y + p.y;
+    uvec2 texel = texelFetch(impostor_texels, row * impostor_size.x + p.x).xy;
+    float distance = uintBitsToFloat(texel.x);
+    if (IMPOSTOR_PLANES && (!IMPOSTOR_IS_OPEN || distance < IMPOSTOR_NOTHING)) {
+        vec2 centre = (vec2(p) + 0.5) / vec2(impostor_size);
         vec3 c = is_cube ? cube_decode(face, 2.0 * centre - 1.0) : directional_decode(centre);
-        vec3 n = unpack_octahedral(impostor_normals[texel], PACKED_NORMAL_BITS);
+        vec3 n = unpack_octahedral(texel.y, PACKED_NORMAL_BITS);
         distance = impostor_plane(distance, dot(n, c), dot(n, v));
     }
     return distance;

@@ -2,8 +2,8 @@
 //!
 //! Source: E. Reinhard, M. Stark, P. Shirley and J. Ferwerda, "Photographic Tone Reproduction for Digital Images", SIGGRAPH 2002, equations 1 to 9. The middle is the
 //! geometric mean of the luminances above 0, where the source adds a small number to all. The white is the brightest luminance, but no less than that which the middle's scale
-//! takes to 1, so that a picture without highlights is scaled and nothing else: its middle is shown as 0.18, that of one with strong highlights as 0.18/1.18. Both forms have the white, where the source's local one has none, so that they show an even
-//! picture alike.
+//! takes to 1, so that a picture without highlights is scaled and nothing else: its middle is shown as 0.18, that of one with strong highlights as 0.18/1.18. Both forms
+//! have the white, where the source's local one has none, so that they show an even picture alike.
 //!
 //! Guarantees: deterministic, on any number of threads; evaluated in f64; a picture scaled as a whole looks the same.
 

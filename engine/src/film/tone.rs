@@ -50,11 +50,15 @@ impl ToneMap {
     /// A picture of linear RGB radiance, in rows of `width` pixels, to 8-bit sRGB: exposure, curve, transfer function, rounding to nearest. +∞ is shown as the curve's
     /// limit, −∞ as black, a NaN as [`NAN_COLOR`]; where the curve depends on the picture, pixels that are not finite change no others.
     pub fn display(&self, pixels: &[[f32; 3]], width: u32) -> Vec<[u8; 3]> {
-        self.display_beside(pixels, pixels, width)
+        self.display_by(pixels, None, width)
     }
 
     /// The same of a picture that is shown beside another, whose brightness decides where the curve depends on one.
     pub fn display_beside(&self, pixels: &[[f32; 3]], reference: &[[f32; 3]], width: u32) -> Vec<[u8; 3]> {
+        self.display_by(pixels, Some(reference), width)
+    }
+
+    fn display_by(&self, pixels: &[[f32; 3]], reference: Option<&[[f32; 3]]>, width: u32) -> Vec<[u8; 3]> {
         let is_local = self.curve == ToneCurve::PhotographicLocal;
         if !self.curve.adapts() {
             return pixels.iter().map(|radiance| self.of_pixel(*radiance, 1.0)).collect();
@@ -64,8 +68,8 @@ impl ToneMap {
             false => f64::NAN,
         };
         let luminances: Vec<f64> = pixels.iter().map(known).collect();
-        let of_reference: Vec<f64> = reference.iter().map(known).collect();
-        let scales = match Adaptation::to(&of_reference, self.exposure) {
+        let of_reference: Option<Vec<f64>> = reference.map(|reference| reference.iter().map(known).collect());
+        let scales = match Adaptation::to(of_reference.as_ref().unwrap_or(&luminances), self.exposure) {
             Some(adaptation) => adaptation.display_scales(&luminances, (width as usize).max(1), is_local),
             // Without light to go by.
             None => vec![self.exposure.exp2(); pixels.len()],

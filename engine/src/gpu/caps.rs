@@ -234,6 +234,9 @@ impl Caps {
         if let Some(bytes) = lesser.heap_bytes {
             self.device_heap = self.device_heap.min(bytes);
         }
+        if let Some(texels) = lesser.max_texel_buffer_elements {
+            self.max_texel_buffer_elements = self.max_texel_buffer_elements.min(texels);
+        }
         if let Some(groups) = lesser.max_workgroups {
             self.max_workgroups = [0, 1, 2].map(|axis| self.max_workgroups[axis].min(groups[axis]));
         }

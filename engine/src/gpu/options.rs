@@ -128,6 +128,8 @@ pub struct Lesser {
     pub max_workgroups: Option<[u32; 3]>,
     /// At most as many bytes in the device's heaps.
     pub heap_bytes: Option<u64>,
+    /// At most as many texels of a texel buffer.
+    pub max_texel_buffer_elements: Option<u64>,
 }
 
 /// Where caches are kept, by the environment. What is empty or relative would depend on the folder that a program happens to run in.

@@ -109,17 +109,10 @@ impl DirectionalMap {
         if border > 0 && !has_borders(map) {
             return wrong("border", border.to_string(), "is none that the cube and discs have");
         }
-        let limit = gpu.caps().max_storage_buffer_range;
         let tile = (size + 2 * border).as_u64vec2().element_product() * u64::from(map.layers());
         // All levels together are at most twice the first, borders included.
-        if 2 * tile * size_of::<[f32; 3]>() as u64 > limit {
-            return Err(Error::LimitExceeded {
-                name: "directional map: texels".into(),
-                value: 2 * tile * size_of::<[f32; 3]>() as u64,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        let bytes = 2 * tile * size_of::<[f32; 3]>() as u64;
+        gpu.caps().check_storage("directional map: texels", bytes)?;
         let (mut all, mut solid_angles) = (Vec::new(), Vec::new());
         let mut first = 0;
         for level in 0..levels {

@@ -50,15 +50,8 @@ impl FluxPyramids {
             levels.push((texels, side));
             texels += u64::from(maps) * u64::from(side).pow(2);
         }
-        let (bytes, limit) = (texels * size_of::<f32>() as u64, gpu.caps().max_storage_buffer_range);
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "flux pyramids".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        let bytes = texels * size_of::<f32>() as u64;
+        gpu.caps().check_storage("flux pyramids", bytes)?;
         let level = |(first, side)| AtlasLevel {
             first: first as u32,
             side,

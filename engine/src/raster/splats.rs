@@ -68,20 +68,12 @@ impl SplatMap {
     /// [`Error::Setting`] for no texels; [`Error::LimitExceeded`] for more than a buffer takes; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, layout: OctahedronLayout, size: UVec2) -> Result<Self> {
         const NAME: &str = "splat map";
-        let limit = gpu.caps().max_storage_buffer_range;
         // All levels together are less than twice the first and a row and a column.
         let bytes = 2 * (size.as_u64vec2() + 1).element_product() * size_of::<SplatTexel>() as u64;
         if size.min_element() == 0 {
             return Err(Error::setting("size", size, "has no texels"));
         }
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: NAME.into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        gpu.caps().check_storage(NAME, bytes)?;
         let levels = levels_of(size);
         let texels: u32 = levels.iter().map(texels_of).sum();
         let bytes = u64::from(texels) * size_of::<SplatTexel>() as u64;

@@ -15,10 +15,10 @@ layout(local_size_x = 64) in;
 #include "finite.glsl"
 #include "invocation.glsl"
 #include "maps/packed_direction.glsl"
+#include "raster/seen_normals.glsl"
 #include "techniques/instant_radiosity/history.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/light_color.glsl"
-#include "raster/seen_normals.glsl"
 #include "transport/luminance.glsl"
 
 layout(push_constant, scalar) uniform Push {

@@ -3,8 +3,9 @@
 //
 // Diffuse surfaces keep a deposit of each photon that has been scattered as often as asked for; for virtual lights (STORES_LIGHTS) all surfaces do
 // that scatter into more than one direction, and what is kept is where the photon is and what it brings. A photon goes on with the probability that
-// leaves its largest band as it is; where one specular scattering would make another path set, by diffuse and glossy lobes alone (ONLY_ROUGH). Scattering functions are those of power (BSDF_IMPORTANCE), and where normals are interpolated the ratio
-// of cosines makes up for it (Veach 1997, 5.3.2), except for what adapt_shading_normal bends.
+// leaves its largest band as it is; where one specular scattering would make another path set, by diffuse and glossy lobes alone (ONLY_ROUGH).
+// Scattering functions are those of power (BSDF_IMPORTANCE), and where normals are interpolated the ratio of cosines makes up for it (Veach 1997, 5.3.2), except for
+// what adapt_shading_normal bends.
 //
 // In scenes with media photon_medium.comp has gone before: it has handled those that did not come as far, and says what is left of the others.
 //

@@ -3,6 +3,7 @@
 use clerestory::Error;
 use clerestory::accel::bvh2::Bvh2;
 use clerestory::accel::{Hit, NO_HIT, RayIndex};
+use clerestory::gpu::shaders::constants::SHADING_NORMAL_BITS;
 use clerestory::gpu::shaders::types::SceneTriangle;
 use clerestory::gpu::{Area, Category, Gpu, GpuOptions, Lesser, OptionalFeatures};
 use clerestory::maps::octahedron::OctahedronLayout;
@@ -110,7 +111,7 @@ fn check(gpu: &Gpu, what: &str, scene: &Scene) -> Tally {
         );
         assert_eq!(position.w, 1.0, "{place}");
         let front = (b - a).as_dvec3().cross((c - a).as_dvec3()).normalize();
-        let [geometric, shading] = normals[pixel].map(|word| unpack_octahedral(word, 16));
+        let [geometric, shading] = normals[pixel].map(|word| unpack_octahedral(word, SHADING_NORMAL_BITS));
         // The packing's bound, and the rounding of a sliver's normal: an edge's rounding over its height.
         let height =
             (b - a).as_dvec3().cross((c - a).as_dvec3()).length() / f64::from((b - a).length().max((c - a).length()));

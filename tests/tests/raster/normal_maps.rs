@@ -1,5 +1,6 @@
 //! Normal maps in the G-buffer against the twin of the path tracer's own.
 
+use clerestory::gpu::shaders::constants::SHADING_NORMAL_BITS;
 use clerestory::gpu::{Area, Gpu};
 use clerestory::maps::packed_direction::unpack_octahedral;
 use clerestory::raster::{GBuffer, GBufferDesc, Layering, Output, SurfaceFeatures, View};
@@ -74,7 +75,9 @@ fn shading_normals(gpu: &Gpu, scene: &Scene) -> (Vec<DVec3>, SurfaceFeatures) {
     let view = View::of_camera(&scene.cameras[0], &surfaces, Area::whole(SIZE)).unwrap();
     draw(gpu, &gbuffer, &on_device, &[view]);
     let words: Vec<[u32; 2]> = gbuffer.read(gpu, Output::Normals).unwrap();
-    let both = words.iter().map(|pair| pair.map(|word| unpack_octahedral(word, 16)));
+    let both = words
+        .iter()
+        .map(|pair| pair.map(|word| unpack_octahedral(word, SHADING_NORMAL_BITS)));
     let normals = both.map(|[geometric, shading]| {
         assert!((geometric - DVec3::Y).length() < 1e-4, "{geometric}");
         shading

@@ -2,6 +2,7 @@
 
 use clerestory::Error;
 use clerestory::gpu::ash::vk;
+use clerestory::gpu::shaders::constants::SHADING_NORMAL_BITS;
 use clerestory::gpu::{Access, Area, Category, Gpu};
 use clerestory::maps::packed_direction::unpack_octahedral;
 use clerestory::raster::upsample::{SeenPoint, UpsampleDesc, UpsampledPicture, Upsampler, upsampled};
@@ -61,7 +62,7 @@ fn points(gpu: &Gpu, gbuffer: &GBuffer) -> Vec<Option<SeenPoint>> {
         .map(|([x, y, z, w], words)| {
             (w != 0.0).then(|| SeenPoint {
                 position: Vec3::new(x, y, z).as_dvec3(),
-                normal: unpack_octahedral(words[1], 16),
+                normal: unpack_octahedral(words[1], SHADING_NORMAL_BITS),
             })
         })
         .collect()

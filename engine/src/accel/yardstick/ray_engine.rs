@@ -50,16 +50,8 @@ impl RayEngine {
         if rays.is_empty() || triangles.is_empty() {
             return Ok((rays.iter().map(|ray| Hit::none(ray.t_max)).collect(), Vec::new()));
         }
-        let (gpu, limit) = (&self.gpu, self.gpu.caps().max_storage_buffer_range);
-        let bytes = size_of_val(rays) as u64;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "ray engine: rays".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        let gpu = &self.gpu;
+        gpu.caps().check_storage("ray engine: rays", size_of_val(rays) as u64)?;
         let corners: Vec<EngineTriangle> = triangles
             .iter()
             .map(|[a, b, c]| EngineTriangle {

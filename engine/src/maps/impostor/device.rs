@@ -7,10 +7,11 @@ use super::super::directional_map::kind;
 use super::search::is_ray;
 use super::settings::ImpostorSettings;
 use super::{ImpostorHit, ImpostorImage, ImpostorRay};
+use crate::gpu::ash::vk;
 use crate::gpu::shaders::maps::impostor_search as kernel;
 use crate::gpu::shaders::sets::ImpostorSet;
 use crate::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery, ImpostorShape};
-use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, TexelView};
 use crate::maps::is_unit;
 use crate::{Error, Result};
 
@@ -21,44 +22,43 @@ pub struct Impostor {
     map: Parametrization,
     kind: u32,
     layers: u32,
+    has_normals: bool,
+    is_open: bool,
     shape: Buffer,
-    distances: Buffer,
-    normals: Option<Buffer>,
+    texels: TexelView,
 }
 
 impl Impostor {
     /// Uploads an image.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] for one whose distances do not fit a storage buffer's range; [`Error::Setting`] for a map that no kernel looks up;
+    /// [`Error::LimitExceeded`] for one of more texels than a texel buffer has; [`Error::Setting`] for a map that no kernel looks up;
     /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
     pub fn new(gpu: &Gpu, image: &ImpostorImage) -> Result<Self> {
         let kind =
             kind(image.map()).ok_or_else(|| Error::setting("map", image.map(), "has no impostors on the device"))?;
-        let limit = gpu.caps().max_storage_buffer_range;
-        let bytes = size_of_val(image.distances()) as u64;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "impostor: distances".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
         let shape = ImpostorShape {
             size: image.size().as_ivec2().to_array(),
             extent: image.extent(),
         };
-        let normals = image.normals();
-        let upload = |words: &[u32]| gpu.buffer_with("impostor: normals", Category::Light, words);
+        let name = "impostor: texels";
+        let texels = match image.normals() {
+            Some(normals) => {
+                let pairs = image.distances().iter().zip(normals);
+                let pairs: Vec<[u32; 2]> = pairs.map(|(distance, normal)| [distance.to_bits(), *normal]).collect();
+                gpu.texels_with(name, Category::Light, vk::Format::R32G32_UINT, &pairs)
+            }
+            None => gpu.texels_with(name, Category::Light, vk::Format::R32_UINT, image.distances()),
+        };
         Ok(Self {
             gpu: gpu.clone(),
             map: image.map(),
             kind,
             layers: image.layers(),
+            has_normals: image.normals().is_some(),
+            is_open: image.is_open(),
             shape: gpu.buffer_with("impostor: shape", Category::Light, &[shape])?,
-            distances: gpu.buffer_with("impostor: distances", Category::Light, image.distances())?,
-            normals: normals.map(upload).transpose()?,
+            texels: texels?,
         })
     }
 
@@ -72,18 +72,21 @@ impl Impostor {
         self.layers
     }
 
-    /// Bytes of distances, and of normals.
-    pub fn bytes(&self) -> [u64; 2] {
-        [self.distances.bytes(), self.normals.as_ref().map_or(0, Buffer::bytes)]
+    /// Bytes of distances, and of normals where there are any.
+    pub fn bytes(&self) -> u64 {
+        self.texels.buffer().bytes()
+    }
+
+    /// Whether some texel of some layer has no surface.
+    pub fn is_open(&self) -> bool {
+        self.is_open
     }
 
     /// The set that `maps/impostor_set.glsl` reads.
     pub fn set(&self) -> ImpostorSet<'_> {
         ImpostorSet {
             impostor_shapes: self.shape.view(),
-            impostor_distances: self.distances.view(),
-            // Kernels without normals do not read them.
-            impostor_normals: self.normals.as_ref().unwrap_or(&self.distances).view(),
+            impostor_texels: &self.texels,
         }
     }
 
@@ -93,37 +96,8 @@ impl Impostor {
     /// [`Error::Setting`] for settings out of range, for a ray whose direction is no unit vector, and for one that does not begin nearer than
     /// [`ImpostorImage::NOTHING`]; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn search(&self, rays: &[ImpostorRay], settings: &ImpostorSettings) -> Result<Vec<ImpostorHit>> {
-        self.search_timed(rays, settings).map(|(hits, _)| hits)
-    }
-
-    /// The same, with the time of the search on the device in seconds.
-    ///
-    /// # Errors
-    /// As [`Impostor::search`].
-    pub fn search_timed(&self, rays: &[ImpostorRay], settings: &ImpostorSettings) -> Result<(Vec<ImpostorHit>, f64)> {
         let search = ImpostorSearch::new(&self.gpu, self, settings)?;
-        let queries = queries(rays)?;
-        if rays.is_empty() {
-            return Ok((Vec::new(), 0.0));
-        }
-        let queries = self.gpu.buffer_with("impostor: rays", Category::Work, &queries)?;
-        let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
-        let hits = self
-            .gpu
-            .buffer(&BufferDesc::storage("impostor: hits", bytes, Category::Work))?;
-        let mut recorder = self.gpu.recorder("impostor")?;
-        recorder.pass("impostor: search", |pass| {
-            search.record(pass, self, queries.view(), hits.view(), rays.len() as u32)
-        })?;
-        let seconds = recorder.submit()?.wait()?.seconds();
-        let hits: Vec<DeviceHit> = self.gpu.read(hits.view(), rays.len())?;
-        let hit = |hit: DeviceHit| ImpostorHit {
-            direction: DVec3::from_array(hit.direction.map(f64::from)),
-            distance: hit.distance.into(),
-            residual: hit.residual.into(),
-            layer: hit.layer,
-        };
-        Ok((hits.into_iter().map(hit).collect(), seconds))
+        search.search_timed(self, rays).map(|(hits, _)| hits)
     }
 }
 
@@ -146,7 +120,7 @@ pub(super) fn queries(rays: &[ImpostorRay]) -> Result<Vec<ImpostorQuery>> {
     rays.iter().enumerate().map(query).collect()
 }
 
-/// A search on the device: a kernel over rays, specialized by the method, its steps, the map, its layers and whether it has normals.
+/// A search on the device: a kernel over rays, specialized by the method, its steps, the map, its layers, and whether it has normals and places without a surface.
 #[derive(Debug)]
 pub struct ImpostorSearch {
     spec: kernel::Spec,
@@ -177,13 +151,42 @@ impl ImpostorSearch {
             impostor_steps: settings.steps,
             impostor_bisections: settings.bisections,
             impostor_layers: impostor.layers,
-            impostor_planes: impostor.normals.is_some(),
+            impostor_planes: impostor.has_normals,
+            impostor_is_open: impostor.is_open,
         }
     }
 
     /// The kernel with its specialization.
     pub fn info(&self) -> PipelineInfo {
         self.pipeline.info()
+    }
+
+    /// What rays meet, in their order, with the time of the search on the device in seconds. A software device compiles its kernel within the first one.
+    ///
+    /// # Errors
+    /// As [`Impostor::search`] and [`ImpostorSearch::record`].
+    pub fn search_timed(&self, impostor: &Impostor, rays: &[ImpostorRay]) -> Result<(Vec<ImpostorHit>, f64)> {
+        let queries = queries(rays)?;
+        if rays.is_empty() {
+            return Ok((Vec::new(), 0.0));
+        }
+        let gpu = &impostor.gpu;
+        let queries = gpu.buffer_with("impostor: rays", Category::Work, &queries)?;
+        let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
+        let hits = gpu.buffer(&BufferDesc::storage("impostor: hits", bytes, Category::Work))?;
+        let mut recorder = gpu.recorder("impostor")?;
+        recorder.pass("impostor: search", |pass| {
+            self.record(pass, impostor, queries.view(), hits.view(), rays.len() as u32)
+        })?;
+        let seconds = recorder.submit()?.wait()?.seconds();
+        let hits: Vec<DeviceHit> = gpu.read(hits.view(), rays.len())?;
+        let hit = |hit: DeviceHit| ImpostorHit {
+            direction: DVec3::from_array(hit.direction.map(f64::from)),
+            distance: hit.distance.into(),
+            residual: hit.residual.into(),
+            layer: hit.layer,
+        };
+        Ok((hits.into_iter().map(hit).collect(), seconds))
     }
 
     /// Records the search for `count` rays of the type [`ImpostorQuery`] into hits of the type [`DeviceHit`](crate::gpu::shaders::types::ImpostorHit),
@@ -193,7 +196,8 @@ impl ImpostorSearch {
     /// ended. After it the hits have been written by a compute shader.
     ///
     /// # Errors
-    /// [`Error::Setting`] for an impostor of another map, other layers, or with normals where the one before had none; and as [`Pass::dispatch`].
+    /// [`Error::Setting`] for an impostor of another map, other layers, with normals where the one before had none or the other way round, or with places without
+    /// a surface where that one had none; and as [`Pass::dispatch`].
     pub fn record(
         &self,
         pass: &mut Pass<'_>,
@@ -204,12 +208,13 @@ impl ImpostorSearch {
     ) -> Result<()> {
         let same = impostor.kind == self.spec.directional_kind
             && impostor.layers == self.spec.impostor_layers
-            && impostor.normals.is_some() == self.spec.impostor_planes;
+            && impostor.has_normals == self.spec.impostor_planes
+            && (self.spec.impostor_is_open || !impostor.is_open);
         if !same {
             return Err(Error::setting(
                 "impostor",
                 impostor.map,
-                "differs in map, layers or normals",
+                "differs in map, layers, normals or places without a surface",
             ));
         }
         let set = kernel::Set0 { queries: rays, hits };

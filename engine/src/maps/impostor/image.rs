@@ -196,6 +196,11 @@ impl ImpostorImage {
         [self.nearest, self.farthest]
     }
 
+    /// Whether some texel of some layer has [`NOTHING`](Self::NOTHING).
+    pub fn is_open(&self) -> bool {
+        self.distances.iter().any(|distance| *distance >= Self::NOTHING)
+    }
+
     /// Distance to the surface of a layer in a direction of any length but 0: twin of `impostor_distance` of `maps/impostor_set.glsl`.
     pub fn distance(&self, layer: u32, direction: DVec3) -> f64 {
         let nothing = f64::from(Self::NOTHING);

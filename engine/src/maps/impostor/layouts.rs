@@ -9,8 +9,9 @@ use glam::{DVec3, UVec2};
 use super::super::directional_map::kind;
 use super::device::queries;
 use super::{ImpostorImage, ImpostorRay, ImpostorSettings};
+use crate::gpu::ash::vk;
 use crate::gpu::shaders::maps::impostor_layouts as kernel;
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu};
+use crate::gpu::{BufferDesc, Category, ComputePipeline, Gpu, TexelView};
 use crate::maps::MapImage;
 use crate::{Error, Result};
 
@@ -30,8 +31,9 @@ pub struct ImpostorLayouts {
     kind: u32,
     size: UVec2,
     extent: [f32; 2],
-    texels: Buffer,
-    distances: Buffer,
+    texels: TexelView,
+    distances: TexelView,
+    is_open: bool,
 }
 
 impl ImpostorLayouts {
@@ -54,59 +56,84 @@ impl ImpostorLayouts {
         let texels: Vec<[f32; 4]> = both
             .map(|(radiance, distance)| radiance.extend(*distance).to_array())
             .collect();
+        let upload = |name, format, values: &[f32]| gpu.texels_with(name, Category::Light, format, values);
         Ok(Self {
             gpu: gpu.clone(),
             kind,
             size,
             extent: image.extent(),
-            texels: gpu.buffer_with("impostor: texels", Category::Light, &texels)?,
-            distances: gpu.buffer_with("impostor: distances", Category::Light, image.distances())?,
+            texels: upload(
+                "impostor: texels",
+                vk::Format::R32G32B32A32_SFLOAT,
+                bytemuck::cast_slice(&texels),
+            )?,
+            distances: upload("impostor: distances", vk::Format::R32_SFLOAT, image.distances())?,
+            is_open: image.is_open(),
         })
     }
 
-    /// Radiance of what rays meet, in their order, and the time on the device in seconds: twin [`ImpostorImage::search`] and the texel in its direction.
+    /// Makes the kernel of a search in a layout.
     ///
     /// # Errors
-    /// As [`Impostor::search`](super::Impostor::search).
-    pub fn look_up_timed(
-        &self,
-        rays: &[ImpostorRay],
-        settings: &ImpostorSettings,
-        layout: ImpostorLayout,
-    ) -> Result<(Vec<DVec3>, f64)> {
+    /// As [`ImpostorSettings::check`]; [`Error::OutOfMemory`].
+    pub fn look_up(&self, settings: &ImpostorSettings, layout: ImpostorLayout) -> Result<ImpostorLookUp<'_>> {
         settings.check(1)?;
-        let queries = queries(rays)?;
-        if rays.is_empty() {
-            return Ok((Vec::new(), 0.0));
-        }
-        let gpu = &self.gpu;
-        let pipeline = gpu.compute_pipeline::<kernel::Kernel>(&kernel::Spec {
+        let pipeline = self.gpu.compute_pipeline(&kernel::Spec {
             directional_kind: self.kind,
             impostor_method: settings.method.number(),
             impostor_steps: settings.steps,
             impostor_bisections: settings.bisections,
             directional_border: 0,
             impostor_layers: 1,
+            impostor_is_open: self.is_open,
             impostor_packed: layout == ImpostorLayout::Packed,
         })?;
+        Ok(ImpostorLookUp {
+            layouts: self,
+            tolerance: settings.tolerance,
+            pipeline,
+        })
+    }
+}
+
+/// A search in one layout, with the radiance of what it finds.
+#[derive(Debug)]
+pub struct ImpostorLookUp<'a> {
+    layouts: &'a ImpostorLayouts,
+    tolerance: f32,
+    pipeline: ComputePipeline<kernel::Kernel>,
+}
+
+impl ImpostorLookUp<'_> {
+    /// Radiance of what rays meet, in their order, and the time on the device in seconds: twin [`ImpostorImage::search`] and the texel in its direction. A
+    /// software device compiles the kernel within the first one.
+    ///
+    /// # Errors
+    /// As [`Impostor::search`](super::Impostor::search).
+    pub fn look_up_timed(&self, rays: &[ImpostorRay]) -> Result<(Vec<DVec3>, f64)> {
+        let queries = queries(rays)?;
+        if rays.is_empty() {
+            return Ok((Vec::new(), 0.0));
+        }
+        let (layouts, gpu, pipeline) = (self.layouts, &self.layouts.gpu, &self.pipeline);
         let queries = gpu.buffer_with("impostor: rays", Category::Work, &queries)?;
         let bytes = (rays.len() * size_of::<[f32; 3]>()) as u64;
         let values = gpu.buffer(&BufferDesc::storage("impostor: values", bytes, Category::Work))?;
         let set = kernel::Set0 {
             queries: queries.view(),
-            texels: self.texels.view(),
-            distances: self.distances.view(),
+            texels: &layouts.texels,
+            distances: &layouts.distances,
             values: values.view(),
         };
         let push = kernel::Push {
-            size: self.size.as_ivec2().to_array(),
-            extent: self.extent,
+            size: layouts.size.as_ivec2().to_array(),
+            extent: layouts.extent,
             count: rays.len() as u32,
-            tolerance: settings.tolerance,
+            tolerance: self.tolerance,
         };
         let mut recorder = gpu.recorder("impostor layouts")?;
         recorder.pass("impostor: look-up", |pass| {
-            pass.dispatch(&pipeline, &[&set], &push, pipeline.groups_over(push.count))
+            pass.dispatch(pipeline, &[&set], &push, pipeline.groups_over(push.count))
         })?;
         let seconds = recorder.submit()?.wait()?.seconds();
         let values: Vec<[f32; 3]> = gpu.read(values.view(), rays.len())?;

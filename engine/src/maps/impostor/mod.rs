@@ -99,7 +99,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/maps/impostors.rs::rays_that_are_none_find_nothing_in_the_kernel",
             "tests/tests/maps/impostors.rs::the_sky_is_seen_in_the_rays_own_direction",
             "tests/tests/maps/impostors.rs::what_cannot_be_searched_is_refused_by_name",
-            "tests/tests/maps/impostors.rs::distances_beyond_a_storage_buffers_range_are_refused",
+            "tests/tests/maps/impostors.rs::distances_beyond_a_texel_buffer_are_refused",
         ],
         api: &[
             "clerestory::maps::impostor::Impostor",

@@ -146,17 +146,8 @@ pub(super) fn vertices_within(caps: &Caps) -> u64 {
 /// # Errors
 /// [`Error::LimitExceeded`] where it holds less than one.
 pub(super) fn sums_within(caps: &Caps, [width, height]: [u32; 2]) -> Result<u32> {
-    let (value, limit) = (
-        u64::from(width) * u64::from(height) * size_of::<SplatSum>() as u64,
-        caps.max_storage_buffer_range,
-    );
-    match limit / value.max(1) {
-        0 => Err(Error::LimitExceeded {
-            name: "sums of light subpaths by pixel".into(),
-            value,
-            limit_name: "maxStorageBufferRange",
-            limit,
-        }),
-        most => Ok(most.min(u32::MAX.into()) as u32),
-    }
+    let bytes = u64::from(width) * u64::from(height) * size_of::<SplatSum>() as u64;
+    caps.check_storage("sums of light subpaths by pixel", bytes)?;
+    let most = caps.max_storage_buffer_range / bytes.max(1);
+    Ok(most.min(u32::MAX.into()) as u32)
 }

@@ -220,15 +220,7 @@ impl Capture {
             return Err(Error::setting("place", plan.place, "is not finite"));
         }
         let bytes = plan.layer_bytes() * u64::from(plan.layers);
-        let limit = gpu.caps().max_storage_buffer_range;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: RADIANCE.into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        gpu.caps().check_storage(RADIANCE, bytes)?;
         Ok(Self {
             drawing: MapDrawing::new(gpu, scene, &plan)?,
             tracer: None,

@@ -8,13 +8,14 @@ use super::capture::Captured;
 use super::settings::{ReflectionMethod, ReflectionSettings};
 use crate::Result;
 use crate::accel::Ray;
+use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL, REFLECTION_NONE, REFLECTION_REFRACTED,
 };
 use crate::gpu::shaders::sets::{ImpostorSet, WaveSet};
 use crate::gpu::shaders::techniques::impostors::impostor_reflect as kernel;
-use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};
 use crate::maps::impostor::Impostor;
 use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
@@ -60,6 +61,8 @@ pub(super) struct Reflections {
     radiance: Buffer,
     side: u32,
     impostor: Option<Impostor>,
+    /// Stands where kernels without distances have none to read.
+    no_texels: TexelView,
     place: Vec3,
     tolerance: f32,
     triangles: Range<u32>,
@@ -98,6 +101,7 @@ impl Reflections {
             impostor_bisections: search.map_or(0, |search| search.bisections),
             impostor_layers: settings.layers,
             impostor_planes: impostor.is_some(),
+            impostor_is_open: impostor.as_ref().is_none_or(Impostor::is_open),
             reflects_in_box: settings.method == ReflectionMethod::Box,
             keeps_look_ups,
             // By textures surfaces may be smooth, too.
@@ -115,6 +119,7 @@ impl Reflections {
             radiance: captured.radiance,
             side: captured.side,
             impostor,
+            no_texels: gpu.texels_with("no distances", Category::Light, vk::Format::R32_UINT, &[0u32])?,
             place,
             tolerance: settings.tolerance,
             triangles,
@@ -130,8 +135,7 @@ impl Reflections {
 
     /// Bytes of the map.
     pub fn bytes(&self) -> u64 {
-        let distances = self.impostor.as_ref().map_or([0; 2], Impostor::bytes);
-        self.radiance.bytes() + distances.iter().sum::<u64>()
+        self.radiance.bytes() + self.impostor.as_ref().map_or(0, Impostor::bytes)
     }
 
     /// Counts of the last wave.
@@ -214,8 +218,7 @@ impl ReflectionStage<'_> {
         r.impostor.as_ref().map_or(
             ImpostorSet {
                 impostor_shapes: r.radiance.view(),
-                impostor_distances: r.radiance.view(),
-                impostor_normals: r.radiance.view(),
+                impostor_texels: &r.no_texels,
             },
             Impostor::set,
         )

@@ -108,15 +108,7 @@ impl Preview {
         }
         let size = desc.size.map(|side| side.saturating_mul(desc.samples));
         let bytes = u64::from(size[0]) * u64::from(size[1]) * size_of::<[f32; 3]>() as u64;
-        let limit = gpu.caps().max_storage_buffer_range;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "preview: samples".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        gpu.caps().check_storage("preview: samples", bytes)?;
         // Any of the lights that hosts give may have a place.
         let room = LightRoom {
             all: desc.lights,

@@ -97,16 +97,8 @@ impl Reflective {
             ..Default::default()
         });
         let texels = u64::from(views) * u64::from(side).pow(2);
-        let limit = gpu.caps().max_storage_buffer_range;
         let bytes = texels * size_of::<RsmTexel>() as u64;
-        if bytes > limit {
-            return Err(Error::LimitExceeded {
-                name: "texels of reflective shadow maps".into(),
-                value: bytes,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            });
-        }
+        gpu.caps().check_storage("texels of reflective shadow maps", bytes)?;
         let storage = |name, bytes| gpu.buffer(&BufferDesc::storage(name, bytes, Category::Light));
         Ok(Self {
             gbuffer: GBuffer::new(

@@ -8,7 +8,9 @@ use clerestory::maps::impostor::layouts::{ImpostorLayout, ImpostorLayouts};
 use clerestory::maps::impostor::places::blended_maps;
 use clerestory::maps::impostor::proxy::{box_proxy, hemisphere_proxy, sphere_proxy};
 use clerestory::maps::impostor::room::ShinySphere;
-use clerestory::maps::impostor::{Impostor, ImpostorImage, ImpostorRay, ImpostorSettings, SearchMethod};
+use clerestory::maps::impostor::{
+    Impostor, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, SearchMethod,
+};
 use clerestory::maps::{MapImage, Parametrization};
 use glam::DVec3;
 
@@ -208,14 +210,18 @@ fn searched(
         impostors.push(Impostor::new(gpu, &image)?);
     }
     let of = |search: &Published| &impostors[search.layers as usize - 1];
+    let mut kernels = Vec::new();
+    for search in &all {
+        kernels.push(ImpostorSearch::new(gpu, of(search), &search.settings)?);
+    }
     let times = context.in_turns(TURNS, all.len(), |i| {
-        let (_, seconds) = of(&all[i]).search_timed(&rays, &all[i].settings)?;
+        let (_, seconds) = kernels[i].search_timed(of(&all[i]), &rays)?;
         Ok(1e9 * seconds / rays.len().max(1) as f64)
     })?;
     let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();
     let mut rows = Vec::new();
-    for (search, time) in all.iter().zip(&times) {
-        let hits = of(search).search(&rays, &search.settings)?;
+    for ((search, kernel), time) in all.iter().zip(&kernels).zip(&times) {
+        let (hits, _) = kernel.search_timed(of(search), &rays)?;
         let directions: Vec<DVec3> = hits.iter().map(|hit| hit.direction).collect();
         let way = name(&search.settings, search.layers);
         rows.push(Row {
@@ -249,8 +255,14 @@ fn timed(
     ]
     .map(|(method, steps)| ImpostorSettings::of(method, steps));
     let each = [ImpostorLayout::Split, ImpostorLayout::Packed];
-    let times = context.in_turns(TURNS, ways.len() * each.len(), |i| {
-        let (_, seconds) = layouts.look_up_timed(&rays, &ways[i / 2], each[i % 2])?;
+    let mut look_ups = Vec::new();
+    for way in &ways {
+        for layout in each {
+            look_ups.push(layouts.look_up(way, layout)?);
+        }
+    }
+    let times = context.in_turns(TURNS, look_ups.len(), |i| {
+        let (_, seconds) = look_ups[i].look_up_timed(&rays)?;
         Ok(1e9 * seconds / rays.len().max(1) as f64)
     })?;
     let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();

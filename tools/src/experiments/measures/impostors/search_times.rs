@@ -7,7 +7,9 @@ use clerestory::accel::{Hit, IndexKind, Ray};
 use clerestory::gpu::Gpu;
 use clerestory::maps::Parametrization;
 use clerestory::maps::impostor::room::ShinySphere;
-use clerestory::maps::impostor::{Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSettings, SearchMethod};
+use clerestory::maps::impostor::{
+    Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, SearchMethod,
+};
 use clerestory::{Result, scene};
 use glam::{DVec3, UVec2, Vec3};
 
@@ -93,9 +95,13 @@ pub fn by_steps(context: &Context<'_>, gpu: &Gpu, map: Parametrization, texels: 
     let image = ImpostorImage::from_fn(map, map.size_for(texels), 1, true, |d| sphere.room.surfaces(d))?;
     let impostor = Impostor::new(gpu, &image)?;
     let steps = context.pick(STEPS, &STEPS[FIRST_JUDGED..]);
+    let mut searches = Vec::new();
+    for steps in steps {
+        let settings = ImpostorSettings::of(SearchMethod::FalsePosition, *steps);
+        searches.push(ImpostorSearch::new(gpu, &impostor, &settings)?);
+    }
     let times = context.in_turns(TURNS, steps.len(), |i| {
-        let settings = ImpostorSettings::of(SearchMethod::FalsePosition, steps[i]);
-        let (_, seconds) = impostor.search_timed(&rays, &settings)?;
+        let (_, seconds) = searches[i].search_timed(&impostor, &rays)?;
         Ok(1e9 * seconds / rays.len().max(1) as f64)
     })?;
     let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();
@@ -134,12 +140,13 @@ pub fn beside_rays(context: &Context<'_>, gpu: &Gpu, maps: &[Parametrization], t
     context.each(maps, Parametrization::to_string, |map| {
         let image = captured(&tracer, &triangles, place, *map, map.size_for(texels))?;
         let impostor = Impostor::new(gpu, &image)?;
-        let found = impostor.search(&searched, &hybrid)?;
+        let search = ImpostorSearch::new(gpu, &impostor, &hybrid)?;
+        let (found, _) = search.search_timed(&impostor, &searched)?;
         let pairs = searched.iter().zip(hits.iter().zip(&found));
         let errors: Vec<f64> = pairs.map(|(ray, (hit, found))| error(ray, hit, found)).collect();
         let times = context.in_turns(TURNS, 2, |contender| {
             let seconds = if contender == 0 {
-                impostor.search_timed(&searched, &hybrid)?.1
+                search.search_timed(&impostor, &searched)?.1
             } else {
                 tracer.trace(&rays)?.seconds()
             };
