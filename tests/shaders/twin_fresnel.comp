@@ -40,8 +40,11 @@ void main() {
         out1(1u, cosine_lobe_d(h, in1(7u)));
         out1(2u, cook_torrance_g(l, v, h));
         out1(3u, kelemen_g(l, h));
-        out3(4u, beckmann_sample(in1(6u), in2(8u)));
-        out3(7u, cosine_lobe_sample(in1(7u), in2(8u)));
+        out1(4u, beckmann_g1(l, in1(6u)));
+        out1(5u, cosine_lobe_g1(l, in1(7u)));
+        out1(6u, smith_g(l, v, beckmann_g1(l, in1(6u)), beckmann_g1(v, in1(6u))));
+        out3(7u, beckmann_sample(in1(6u), in2(8u)));
+        out3(10u, cosine_lobe_sample(in1(7u), in2(8u)));
         break;
     }
     case 2u: {  // with the geometric term

@@ -8,7 +8,8 @@ use clerestory::transport::fresnel::simplified::fresnel_simplified;
 use clerestory::transport::fresnel::table::{fresnel_table, fresnel_table_lookup};
 use clerestory::transport::fresnel::tinted::fresnel_tinted;
 use clerestory::transport::microfacets::{
-    beckmann_d, beckmann_sample, cook_torrance_g, cosine_lobe_d, cosine_lobe_sample, kelemen_g,
+    beckmann_d, beckmann_g1, beckmann_sample, cook_torrance_g, cosine_lobe_d, cosine_lobe_g1, cosine_lobe_sample,
+    kelemen_g, smith_g,
 };
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Case, Tolerance, U, compare, trigonometric_error};
@@ -170,6 +171,9 @@ fn microfacets_agree_with_their_twins() {
                 cosine_lobe_d(h, x[7]),
                 cook_torrance_g(l, v, h),
                 kelemen_g(l, h),
+                beckmann_g1(l, x[6]),
+                cosine_lobe_g1(l, x[7]),
+                smith_g(l, v, beckmann_g1(l, x[6]), beckmann_g1(v, x[6])),
             ]
         });
         println!("microfacets: {worst:.3} of what is allowed");
@@ -177,7 +181,7 @@ fn microfacets_agree_with_their_twins() {
         for (case, result) in table.iter().zip(&results) {
             let x = case.0.map(f64::from);
             let u = v2(&x, 8);
-            for (place, expected) in [(4, beckmann_sample(x[6], u)), (7, cosine_lobe_sample(x[7], u))] {
+            for (place, expected) in [(7, beckmann_sample(x[6], u)), (10, cosine_lobe_sample(x[7], u))] {
                 let difference = (result.vector(place) - expected).length();
                 // The sine is a root of what is left of one.
                 let sine = (1.0 - expected.z * expected.z).sqrt();
