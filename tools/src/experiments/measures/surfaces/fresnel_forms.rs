@@ -10,6 +10,7 @@ use clerestory::transport::fresnel::table::{NODES, fresnel_table, fresnel_table_
 use clerestory::transport::fresnel::{fresnel_conductor, rescaled::fresnel_schlick_index};
 use glam::{DVec3, Vec3};
 
+use super::fresnel_curves::MetalCurves;
 use super::fresnel_dips::Dips;
 use super::fresnel_rescaling::Rescaling;
 use super::published_metals::{PUBLISHED, Published};
@@ -109,6 +110,7 @@ pub struct Found {
     errors: Vec<Row>,
     headlines: Vec<Headline>,
     gold: Vec<Gold>,
+    metal_curves: MetalCurves,
     dips: Dips,
     rescaling: Rescaling,
     points: Vec<Point>,
@@ -385,6 +387,7 @@ impl Study for Found {
             errors,
             headlines: headlines.into(),
             gold: gold(steps),
+            metal_curves: MetalCurves::measure(context),
             dips: Dips::measure(context),
             rescaling: Rescaling::measure(context),
             points: [points("aluminium", 700.0), points("gold", 550.0)].concat(),
@@ -430,6 +433,7 @@ impl Study for Found {
             .and(Findings::of(&self.points, &[]).long())
             .curves("aluminium", "Errors for aluminium at 700 nm", axes, curves(&of_metal("aluminium"), |p| p.form.clone(), at))
             .curves("gold", "Errors for gold at 550 nm", axes, curves(&of_metal("gold"), |p| p.form.clone(), at))
+            .and(self.metal_curves.findings())
             .and(self.dips.findings())
             .and(self.rescaling.findings())
     }

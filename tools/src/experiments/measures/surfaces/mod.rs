@@ -6,6 +6,7 @@ pub mod alpha;
 pub mod coupled_reflection;
 pub mod energy;
 pub mod fresnel_cost;
+pub mod fresnel_curves;
 pub mod fresnel_dielectric;
 pub mod fresnel_dips;
 pub mod fresnel_forms;
