@@ -47,6 +47,14 @@ void main() {
         out3(10u, cosine_lobe_sample(in1(7u), in2(8u)));
         break;
     }
+    case 4u: {  // by reflectance and edge tint
+        vec3 eta;
+        vec3 k;
+        artistic_index(in3(0u), in3(3u), eta, k);
+        out3(0u, eta);
+        out3(3u, k);
+        break;
+    }
     case 2u: {  // with the geometric term
         out3(0u, fresnel_table_lookup(cos_i));
         break;

@@ -1,6 +1,6 @@
 //! Forms of a metal's Fresnel factor, the exact one against the complex form, and the table of it with the geometric term.
 
-use clerestory::scene::metals;
+use clerestory::scene::metals::{self, artistic::artistic_index};
 use clerestory::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
 use clerestory::transport::fresnel::fresnel_conductor;
 use clerestory::transport::fresnel::rescaled::{conductor_f0, fresnel_rescaled, fresnel_schlick_average};
@@ -74,6 +74,23 @@ fn forms_agree_with_their_twins() {
             ]
         });
         println!("terms: {worst:.3} of what is allowed");
+    });
+}
+
+#[test]
+fn colours_agree_with_their_twin() {
+    with_gpu(|gpu| {
+        let table = cases(44, |r| {
+            let mut color = |edges: &[f32]| [r.unit(), r.range(0.9, 0.9998), r.choose(edges)];
+            join(&[&color(&[0.0, 0.04, 0.5, 1.0]), &color(&[0.0, 0.3, 1.0])])
+        });
+        let results = twin_fresnel(gpu, 4, &table, &[]);
+        // What one lacks to a reflectance near it has no more digits than its input.
+        let worst = compare("colours", &table, &results, ulps(32.0, 4.0, 16.0 * U), 0..6, |x| {
+            let [eta, k] = artistic_index(v3(x, 0), v3(x, 3));
+            list![eta.to_array(), k.to_array()]
+        });
+        println!("colours: {worst:.3} of what is allowed");
     });
 }
 

@@ -19,4 +19,5 @@ pub mod microfacet_parts;
 pub mod multiple_scattering;
 pub mod published_metals;
 pub mod shading_normals;
+pub mod spectral_ways;
 pub mod tangents;
