@@ -171,6 +171,7 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         ("{ fresnel = \"rescaled\" }", "needs one of"),
         ("{ eta = [0, 1, 1], k = [1, 1, 1] }", "eta from a millionth"),
         ("{ eta = [1, 1, 1], k = [1e10, 1, 1] }", "k from 0 to a million"),
+        ("{ eta = [1, 1, 1], k = [1, 1, -0.1] }", "k from 0 to a million"),
         ("{ eta = [1, 1, 1], k = [1, nan, 1] }", "k from 0 to a million"),
         ("{ reflectance = [1, 1, 2], edge_tint = [0, 0, 0] }", "from 0 to 1"),
         ("{ spectrum = \"nowhere.csv\" }", "metals.ring.spectrum"),

@@ -66,6 +66,16 @@ rows! {
 }
 
 rows! {
+    /// A metal at an end of the range that the thesis names.
+    struct End = "Fall of two metals' n from 430 to 705 nm" by [metal, wavelength] {
+        metal: String = "metal",
+        wavelength: f64 = "wavelength (nm)",
+        n: f64 = "n",
+        published: f64 = "published n",
+    }
+}
+
+rows! {
     /// A place inside a material with n = 1.2, at 400 nm.
     struct Wave = "Waves inside a material" by [extinction, depth] {
         extinction: f64 = "k",
@@ -81,6 +91,7 @@ rows! {
 pub struct Found {
     errors: Vec<Row>,
     indices: Vec<Index>,
+    ends: Vec<End>,
     waves: Vec<Wave>,
 }
 
@@ -137,6 +148,13 @@ const OF_ERRORS: &[Criterion<Row>] = &[
     .among(|row| row.metal == "copper" && row.way == FresnelForm::Schlick.name())
     .because("its green and blue reflect 0.6 and 0.5, where the curve has next to nothing"),
 ];
+const OF_ENDS: &[Criterion<End>] = &[Criterion::each(
+    "n of gold falls from 1.45 to 0.13 and that of copper from 1.25 to 0.21: difference from these",
+    Bound::AtMost(5e-3),
+    |row: &End| (row.n - row.published).abs().into(),
+)
+.because("half of the last published digit")
+.in_every_form()];
 const OF_WAVES: &[Criterion<Wave>] = &[Criterion::each(
     "envelopes are the published ones: their difference",
     Bound::AtMost(5e-4),
@@ -170,6 +188,25 @@ fn row(metal: &str, way: Way, cost: Repeats, pixels: &[DVec3], oracle: &[DVec3])
         blue: bias.z,
         over_channels: None,
     }
+}
+
+fn ends() -> Result<Vec<End>> {
+    const PUBLISHED: [(&str, f64, f64); 4] = [
+        ("gold", 430.0, 1.45),
+        ("gold", 705.0, 0.13),
+        ("copper", 430.0, 1.25),
+        ("copper", 705.0, 0.21),
+    ];
+    let of = |(metal, wavelength, published): (&str, f64, f64)| {
+        let [n, _] = spectrum_of(metal)?.at(wavelength);
+        Ok(End {
+            metal: metal.into(),
+            wavelength,
+            n,
+            published,
+        })
+    };
+    PUBLISHED.into_iter().map(of).collect()
 }
 
 fn waves(steps: u32) -> Vec<Wave> {
@@ -269,6 +306,7 @@ impl Study for Found {
         Ok(Self {
             errors,
             indices,
+            ends: ends()?,
             waves: waves(context.pick(50, 10)),
         })
     }
@@ -294,6 +332,7 @@ impl Study for Found {
                  the number of pictures; all else that a picture takes is multiplied alike.",
             )
             .and(Findings::of(&self.indices, &[]).long())
+            .and(Findings::of(&self.ends, OF_ENDS))
             .and(Findings::of(&self.waves, OF_WAVES).long())
             .curves(
                 "error-and-cost",
