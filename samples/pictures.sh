@@ -19,7 +19,7 @@ xvfb-run -a "$samples/photon_viewer" --size 240x180 --photons 131072 --spread 16
 "$samples/volume_photons" --picture "$out/volume_photons.png" --size 240x240 --photons 65536 --volume ray --frames 8
 xvfb-run -a "$samples/many_lights" --size 180x180 --lights 512 --turn 12 --frames 16 --screenshot "$out/many_lights.png"
 "$samples/octahedron_lab" --output "$out/octahedron_lab.png" --size 1000x400 --channel distance --against cube
-"$samples/reflection_preview" --output "$out/reflection_preview.png" --size 240x180 --samples 4 --shadow 1024 --frames 5
+"$samples/reflection_preview" --output "$out/reflection_preview.png" --size 240x180 --samples 4 --shadow 1024 --frames 5 --search 3
 "$samples/mirror_room" "$out/mirror_room.png" --size 180x180 --spp 64
 "$samples/metals" "$out/metals.png" --size 240x240 --spp 64
 ls -l "$out"

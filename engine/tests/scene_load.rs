@@ -171,6 +171,7 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         ("{ fresnel = \"rescaled\" }", "needs one of"),
         ("{ eta = [0, 1, 1], k = [1, 1, 1] }", "eta from a millionth"),
         ("{ eta = [1, 1, 1], k = [1e10, 1, 1] }", "k from 0 to a million"),
+        ("{ eta = [1, 1, 1], k = [1, 1, -0.1] }", "k from 0 to a million"),
         ("{ eta = [1, 1, 1], k = [1, nan, 1] }", "k from 0 to a million"),
         ("{ reflectance = [1, 1, 2], edge_tint = [0, 0, 0] }", "from 0 to 1"),
         ("{ spectrum = \"nowhere.csv\" }", "metals.ring.spectrum"),
@@ -186,14 +187,12 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         (Distribution::Beckmann, Geometry::CookTorrance)
     );
     assert!(SceneProfile::of(&beckmann).has_classic_microfacets);
-    let simplified = load_metal("{ metal = \"gold\", geometry = \"simplified\" }").materials[0].classic_microfacets;
-    assert_eq!(
-        simplified,
-        Some(Microfacets {
-            distribution: Distribution::Ggx,
-            geometry: Geometry::Simplified,
-        })
-    );
+    for (word, geometry) in [("simplified", Geometry::Simplified), ("smith", Geometry::Smith)] {
+        let metal = load_metal(&format!("{{ metal = \"gold\", geometry = \"{word}\" }}"));
+        let distribution = Distribution::Ggx;
+        let expected = Microfacets { distribution, geometry };
+        assert_eq!(metal.materials[0].classic_microfacets, Some(expected));
+    }
     // Materials that cannot have them are named by the sidecar's key.
     for name in ["worn metal", "glass"] {
         let metal = format!("{name:?} = {{ metal = \"gold\", distribution = \"beckmann\" }}");

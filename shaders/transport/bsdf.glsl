@@ -46,12 +46,13 @@ const uint BSDF_COMPENSATED_CONDUCTOR = 32u;  // F0 and a, with the exponents in
 const uint BSDF_TINTED_CONDUCTOR = 64u;       // F0 and b
 const uint BSDF_SIMPLIFIED_CONDUCTOR = 128u;  // eta and k
 // The metal's microfacets are not GGX's with Smith's masking, and are not compensated for multiple scattering: GGX's, Beckmann's or a cosine lobe, with the
-// geometric term of Cook and Torrance or the simplified one.
+// geometric term of Cook and Torrance, the simplified one or Smith's.
 const uint BSDF_CLASSIC = 256u;
 const uint BSDF_BECKMANN = 512u;
 const uint BSDF_COSINE_LOBE = 1024u;
 const uint BSDF_SIMPLIFIED_G = 2048u;
-const uint BSDF_CLASSIC_FLAGS = BSDF_CLASSIC | BSDF_BECKMANN | BSDF_COSINE_LOBE | BSDF_SIMPLIFIED_G;
+const uint BSDF_SMITH_G = 4096u;
+const uint BSDF_CLASSIC_FLAGS = BSDF_CLASSIC | BSDF_BECKMANN | BSDF_COSINE_LOBE | BSDF_SIMPLIFIED_G | BSDF_SMITH_G;
 
 // A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
 const float ETA_MATCHED = 1.001;
@@ -156,6 +157,25 @@ float classic_d(Bsdf b, vec3 h) {
     return (b.flags & BSDF_COSINE_LOBE) != 0u ? cosine_lobe_d(h, cosine_lobe_exponent(b.alpha)) : ggx_d(h, b.alpha);
 }
 
+// Smith's masking of one direction.
+float classic_g1(Bsdf b, vec3 w) {
+    if ((b.flags & BSDF_BECKMANN) != 0u) {
+        return beckmann_g1(w, b.alpha);
+    }
+    return (b.flags & BSDF_COSINE_LOBE) != 0u ? cosine_lobe_g1(w, cosine_lobe_exponent(b.alpha)) : ggx_g1(w.z, b.alpha);
+}
+
+// The geometric term, over 4 (n.wi) (n.wo).
+float classic_g(Bsdf b, vec3 wo, vec3 wi, vec3 h) {
+    if ((b.flags & BSDF_SIMPLIFIED_G) != 0u) {
+        return kelemen_g(wi, h);
+    }
+    if ((b.flags & BSDF_SMITH_G) != 0u) {
+        return smith_g(wi, wo, classic_g1(b, wi), classic_g1(b, wo));
+    }
+    return cook_torrance_g(wi, wo, h);
+}
+
 // Normals of GGX are those that are visible, others those by their density times their cosine.
 vec3 classic_sample(Bsdf b, vec3 wo, vec2 u) {
     if ((b.flags & BSDF_BECKMANN) != 0u) {
@@ -175,7 +195,7 @@ vec4 classic_eval(Bsdf b, vec3 wo, vec3 wi) {
     float d = classic_d(b, h);
     bool by_cosine = (b.flags & (BSDF_BECKMANN | BSDF_COSINE_LOBE)) != 0u;
     float normals = by_cosine ? d * h.z : ggx_visible_pdf(wo, h, b.alpha);
-    float g = (b.flags & BSDF_SIMPLIFIED_G) != 0u ? kelemen_g(wi, h) : cook_torrance_g(wi, wo, h);
+    float g = classic_g(b, wo, wi, h);
     return vec4(metal_fresnel(b, cos_h) * (d * g * wi.z), normals / (4.0 * cos_h));
 }
 

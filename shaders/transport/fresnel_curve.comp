@@ -55,6 +55,12 @@ vec3 curve_at(float c) {
         return fresnel_tinted(c, push.f0 + drift, push.a + drift);
     case CURVE_SIMPLIFIED:
         return fresnel_simplified(c, push.eta + drift, push.k + drift);
+    case CURVE_ARTISTIC: {
+        vec3 eta;
+        vec3 k;
+        artistic_index(push.f0 + drift, push.a + drift, eta, k);
+        return fresnel_simplified(c, eta, k);
+    }
     case CURVE_TABLE:
         return fresnel_table_lookup(c);
     default:

@@ -12,5 +12,6 @@ const uint CURVE_COMPENSATED_F0 = 6u;     // from it, a and alpha
 const uint CURVE_TINTED = 7u;             // from it and a
 const uint CURVE_SIMPLIFIED = 8u;         // from eta and k
 const uint CURVE_TABLE = 9u;              // times the simplified geometric term
+const uint CURVE_ARTISTIC = 10u;          // the simplified one from the normal reflectance, and an edge tint in a
 
 #endif

@@ -3,12 +3,15 @@
 //
 // Sources: Lazányi and Szirmay-Kalos, "Fresnel Term Approximations for Metals" (WSCG 2005) for the rescaled and the compensated curve;
 // Hoffman, "Fresnel Equations Considered Harmful" (MAM 2019), and Kutz, Hašan and Edmondson, "Novel Aspects of the Adobe Standard Material"
-// (2021) for the exponent 6; Gulbrandsen, "Artist Friendly Metallic Fresnel" (JCGT 3(4), 2014) for the last.
+// (2021) for the exponent 6; Gulbrandsen, "Artist Friendly Metallic Fresnel" (JCGT 3(4), 2014) for the simplified conductor and its index by two colours.
 // Guarantees: results lie in [0, 1] for cosines in [0, 1] and alpha >= 1; coefficients come from the host (transport/fresnel/).
 #ifndef CLERESTORY_TRANSPORT_FRESNEL_FORMS_GLSL
 #define CLERESTORY_TRANSPORT_FRESNEL_FORMS_GLSL
 
 #include "transport/fresnel.glsl"
+
+// Greatest reflectance that two colours give: 1 would need an infinite index.
+const float REFLECTANCE_MAX = 0.9999;
 
 // Reflectance of a conductor against vacuum at normal incidence.
 vec3 conductor_f0(vec3 eta, vec3 k) {
@@ -47,6 +50,17 @@ vec3 fresnel_simplified(float cos_i, vec3 eta, vec3 k) {
     vec3 sum_p = s * c2 + 1.0;
     vec3 sum_s = s + c2;
     return 0.5 * ((sum_p - cross_term) / (sum_p + cross_term) + (sum_s - cross_term) / (sum_s + cross_term));
+}
+
+// n and k of a reflectance at normal incidence and an edge tint.
+void artistic_index(vec3 reflectance, vec3 edge_tint, out vec3 eta, out vec3 k) {
+    vec3 r = clamp(reflectance, vec3(0.0), vec3(REFLECTANCE_MAX));
+    vec3 g = clamp(edge_tint, vec3(0.0), vec3(1.0));
+    vec3 above = 1.0 + sqrt(r);
+    vec3 least = (1.0 - r) / (1.0 + r);
+    vec3 greatest = above * above / (1.0 - r);
+    eta = g * least + (1.0 - g) * greatest;
+    k = sqrt(max((eta - 1.0 / greatest) * (g * (greatest - least)), vec3(0.0)));
 }
 
 // Cosine-weighted hemispherical averages: 2 int F mu dmu.

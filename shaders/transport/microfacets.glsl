@@ -1,5 +1,5 @@
-// Classical parts of the microfacet product: Beckmann's distribution, the cosine lobe, and the geometric terms of Cook and Torrance and of Kelemen and
-// Szirmay-Kalos.
+// Classical parts of the microfacet product: Beckmann's distribution, the cosine lobe, and the geometric terms of Cook and Torrance, of Kelemen and
+// Szirmay-Kalos, and of Smith.
 //
 // Sources and guarantees: transport/microfacets.rs. All directions in the frame whose z is the normal; cosines of l and v with it are positive. Geometric
 // terms hold the 1/(4 (n.l) (n.v)) of the product.
@@ -11,6 +11,10 @@
 
 // Below this cosine of microfacet incidence the simplified term is cut off.
 const float SIMPLIFIED_COSINE_MIN = 1e-3;
+// From this 1 / (m tan) on Beckmann's microfacets hide nothing to speak of.
+const float BECKMANN_UNMASKED_MIN = 1.6;
+// sqrt(pi) - 1: how much GGX masks at grazing incidence beyond Beckmann's distribution, over what that does.
+const float GGX_EXCESS = 0.77245385;
 
 // Beckmann's density of microfacet normals, of slope m.
 float beckmann_d(vec3 h, float m) {
@@ -55,5 +59,27 @@ float kelemen_g(vec3 l, vec3 h) {
     float c = max(dot(l, h), SIMPLIFIED_COSINE_MIN);
     return 1.0 / (4.0 * c * c);
 }
+
+// Beckmann's masking of a direction w, of slope m.
+float beckmann_g1(vec3 w, float m) {
+    float c = w.z;
+    float slope = m * length(w.xy);
+    return c >= BECKMANN_UNMASKED_MIN * slope
+        ? 1.0
+        : c * (3.535 * slope + 2.181 * c) / (slope * slope + 2.276 * slope * c + 2.577 * c * c);
+}
+
+// The cosine lobe's masking of a direction w, of exponent s.
+float cosine_lobe_g1(vec3 w, float s) {
+    float width2 = 2.0 / (s + 2.0);
+    float beckmann = beckmann_g1(w, sqrt(width2));
+    float ggx = 2.0 * w.z / (w.z + sqrt(w.z * w.z + width2 * dot(w.xy, w.xy)));
+    float last = GGX_EXCESS - 0.75 - 1.0 / 64.0;
+    float share = width2 * (0.75 + width2 * (1.0 / 64.0 + width2 * last)) / ((2.0 - width2) * GGX_EXCESS);
+    return beckmann * ggx / (ggx + share * (beckmann - ggx));
+}
+
+// Smith's term of both directions' masking.
+float smith_g(vec3 l, vec3 v, float g1_l, float g1_v) { return g1_l * g1_v / (4.0 * l.z * v.z); }
 
 #endif

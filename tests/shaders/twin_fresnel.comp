@@ -40,8 +40,19 @@ void main() {
         out1(1u, cosine_lobe_d(h, in1(7u)));
         out1(2u, cook_torrance_g(l, v, h));
         out1(3u, kelemen_g(l, h));
-        out3(4u, beckmann_sample(in1(6u), in2(8u)));
-        out3(7u, cosine_lobe_sample(in1(7u), in2(8u)));
+        out1(4u, beckmann_g1(l, in1(6u)));
+        out1(5u, cosine_lobe_g1(l, in1(7u)));
+        out1(6u, smith_g(l, v, beckmann_g1(l, in1(6u)), beckmann_g1(v, in1(6u))));
+        out3(7u, beckmann_sample(in1(6u), in2(8u)));
+        out3(10u, cosine_lobe_sample(in1(7u), in2(8u)));
+        break;
+    }
+    case 4u: {  // by reflectance and edge tint
+        vec3 eta;
+        vec3 k;
+        artistic_index(in3(0u), in3(3u), eta, k);
+        out3(0u, eta);
+        out3(3u, k);
         break;
     }
     case 2u: {  // with the geometric term

@@ -2,6 +2,7 @@
 
 use std::process::{Command, Output, Stdio};
 
+use clerestory::transport::fresnel::curve::CurveForm;
 use serde_json::Value;
 
 fn run(arguments: &[&str]) -> Output {
@@ -45,6 +46,27 @@ fn metals_are_shown_with_their_forms() {
     );
     assert_eq!(shown["bands"][1]["compensation"], "fitted");
     assert_eq!(shown["curve"][0]["cosine"], 1.0);
+}
+
+#[test]
+fn forms_are_timed_where_it_is_asked_for() {
+    assert!(json(&["gold"])["costs"].is_null());
+    let shown = json(&["gold", "--cost"]);
+    let costs = shown["costs"].as_array().expect("costs");
+    for form in CurveForm::ALL {
+        let name = serde_json::to_value(form).expect("name");
+        let cost = costs.iter().find(|cost| cost["form"] == name).expect("form");
+        let [time, share] = ["nanoseconds", "over_exact"].map(|key| cost[key].as_f64().expect("number"));
+        assert!(time > 0.0 && share > 0.0, "{cost}");
+        assert!(form != CurveForm::Exact || share == 1.0, "{cost}");
+    }
+    assert_eq!(costs.len(), CurveForm::ALL.len());
+    let output = run(&["copper", "--cost"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        output.status.success() && text.contains("form on the device") && text.contains("rescaled-f0"),
+        "{text}"
+    );
 }
 
 #[test]

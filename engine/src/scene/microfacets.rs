@@ -1,4 +1,4 @@
-//! Classical microfacets of metals, in place of GGX under Smith's masking.
+//! Classical microfacets of metals, in place of GGX under Smith's height-correlated masking with compensation for multiple scattering.
 
 /// How normals of microfacets are distributed; all by the width that the material's roughness gives GGX.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
@@ -22,6 +22,8 @@ pub enum Geometry {
     CookTorrance,
     /// The term of one cosine by Kelemen and Szirmay-Kalos.
     Simplified,
+    /// Smith's term of the distribution, of both directions apart: G1 · G1, as Mitsuba has it.
+    Smith,
 }
 
 /// Microfacets of a metal without compensation for multiple scattering.

@@ -561,6 +561,7 @@ fn metal_floors_under_a_sky_reflect_by_the_form_they_name() {
             (Distribution::Ggx, Geometry::Simplified),
             (Distribution::Beckmann, Geometry::CookTorrance),
             (Distribution::CosineLobe, Geometry::Simplified),
+            (Distribution::Beckmann, Geometry::Smith),
         ] {
             let scene = floor_of(Material {
                 roughness: 0.6,

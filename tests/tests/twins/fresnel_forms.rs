@@ -1,6 +1,6 @@
 //! Forms of a metal's Fresnel factor, the exact one against the complex form, and the table of it with the geometric term.
 
-use clerestory::scene::metals;
+use clerestory::scene::metals::{self, artistic::artistic_index};
 use clerestory::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
 use clerestory::transport::fresnel::fresnel_conductor;
 use clerestory::transport::fresnel::rescaled::{conductor_f0, fresnel_rescaled, fresnel_schlick_average};
@@ -8,7 +8,8 @@ use clerestory::transport::fresnel::simplified::fresnel_simplified;
 use clerestory::transport::fresnel::table::{fresnel_table, fresnel_table_lookup};
 use clerestory::transport::fresnel::tinted::fresnel_tinted;
 use clerestory::transport::microfacets::{
-    beckmann_d, beckmann_sample, cook_torrance_g, cosine_lobe_d, cosine_lobe_sample, kelemen_g,
+    beckmann_d, beckmann_g1, beckmann_sample, cook_torrance_g, cosine_lobe_d, cosine_lobe_g1, cosine_lobe_sample,
+    kelemen_g, smith_g,
 };
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Case, Tolerance, U, compare, trigonometric_error};
@@ -73,6 +74,23 @@ fn forms_agree_with_their_twins() {
             ]
         });
         println!("terms: {worst:.3} of what is allowed");
+    });
+}
+
+#[test]
+fn colours_agree_with_their_twin() {
+    with_gpu(|gpu| {
+        let table = cases(44, |r| {
+            let mut color = |edges: &[f32]| [r.unit(), r.range(0.9, 0.9998), r.choose(edges)];
+            join(&[&color(&[0.0, 0.04, 0.5, 1.0]), &color(&[0.0, 0.3, 1.0])])
+        });
+        let results = twin_fresnel(gpu, 4, &table, &[]);
+        // What one lacks to a reflectance near it has no more digits than its input.
+        let worst = compare("colours", &table, &results, ulps(32.0, 4.0, 16.0 * U), 0..6, |x| {
+            let [eta, k] = artistic_index(v3(x, 0), v3(x, 3));
+            list![eta.to_array(), k.to_array()]
+        });
+        println!("colours: {worst:.3} of what is allowed");
     });
 }
 
@@ -170,6 +188,9 @@ fn microfacets_agree_with_their_twins() {
                 cosine_lobe_d(h, x[7]),
                 cook_torrance_g(l, v, h),
                 kelemen_g(l, h),
+                beckmann_g1(l, x[6]),
+                cosine_lobe_g1(l, x[7]),
+                smith_g(l, v, beckmann_g1(l, x[6]), beckmann_g1(v, x[6])),
             ]
         });
         println!("microfacets: {worst:.3} of what is allowed");
@@ -177,7 +198,7 @@ fn microfacets_agree_with_their_twins() {
         for (case, result) in table.iter().zip(&results) {
             let x = case.0.map(f64::from);
             let u = v2(&x, 8);
-            for (place, expected) in [(4, beckmann_sample(x[6], u)), (7, cosine_lobe_sample(x[7], u))] {
+            for (place, expected) in [(7, beckmann_sample(x[6], u)), (10, cosine_lobe_sample(x[7], u))] {
                 let difference = (result.vector(place) - expected).length();
                 // The sine is a root of what is left of one.
                 let sine = (1.0 - expected.z * expected.z).sqrt();

@@ -4,8 +4,8 @@ use clerestory::scene::FresnelForm;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{
     BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_PHONG,
-    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext,
-    BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf, bsdf_sample,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G, BSDF_TINTED_CONDUCTOR, Bsdf,
+    BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf, bsdf_sample,
 };
 use clerestory::transport::fresnel::form::MetalFresnel;
 use clerestory_tests::random::Random;
@@ -62,6 +62,9 @@ fn the_scattering_function_agrees_with_its_twin() {
                     BSDF_CLASSIC,
                     BSDF_CLASSIC | BSDF_BECKMANN,
                     BSDF_CLASSIC | BSDF_COSINE_LOBE | BSDF_SIMPLIFIED_G,
+                    BSDF_CLASSIC | BSDF_SMITH_G,
+                    BSDF_CLASSIC | BSDF_BECKMANN | BSDF_SMITH_G,
+                    BSDF_CLASSIC | BSDF_COSINE_LOBE | BSDF_SMITH_G,
                 ]);
                 let (parameters, flags) = match kind.checked_sub(3) {
                     Some(form) => forms[form],

@@ -4,7 +4,9 @@
 //! material, light, camera, environment and medium that the exporter knows. Guarantees: a pure function; the exporter accepts every one (a test checks it).
 
 use clerestory::Result;
-use clerestory::scene::{Camera, Environment, Material, Projection, Scene, builtin, metals};
+use clerestory::scene::{
+    Camera, Distribution, Environment, Geometry, Material, Microfacets, Projection, Scene, builtin, metals,
+};
 use glam::Vec3;
 
 /// A scene to compare.
@@ -46,6 +48,19 @@ pub fn scenes() -> Result<Vec<ComparedScene>> {
     repaint(&mut frosted, "glass", |m| m.roughness = 0.5);
     add("cornell-frosted", "rough glass sphere (alpha 0.25)", frosted);
     add("cornell-metals", "rough and smooth conductors", cornell_metals()?);
+    let mut beckmann = flat("cornell-box?sphere=gold")?;
+    repaint(&mut beckmann, "gold", |m| {
+        m.roughness = 0.5;
+        m.classic_microfacets = Some(Microfacets {
+            distribution: Distribution::Beckmann,
+            geometry: Geometry::Smith,
+        });
+    });
+    add(
+        "cornell-beckmann",
+        "rough gold of Beckmann's distribution (slope 0.25) under Smith's term",
+        beckmann,
+    );
 
     let mut lens = flat("cornell-box")?;
     with_camera(&mut lens, |camera| {

@@ -1,6 +1,6 @@
 //! Materials as Mitsuba plugins: those that are the same function on both sides, and the reasons against all others.
 
-use clerestory::scene::{AlphaMode, FresnelForm, Material};
+use clerestory::scene::{AlphaMode, Distribution, FresnelForm, Geometry, Material, Microfacets};
 use glam::Vec3;
 
 use super::rgb;
@@ -39,7 +39,7 @@ pub(super) fn describe(material: &Material, notes: &mut Vec<String>) -> Result<S
         );
     };
     let is_rough = (material.metallic == 1.0 || material.transmission > 0.0) && alpha >= MIRROR_ALPHA;
-    if is_rough {
+    if is_rough && material.classic_microfacets.is_none() {
         notes.push(SINGLE_SCATTERING.into());
     }
     let emitter = emitter(material)?;
@@ -106,12 +106,6 @@ fn metal(material: &Material, alpha: f32) -> Result<String, String> {
                 material.fresnel
             ));
         }
-        // Beckmann's distribution and GGX's are the same on both sides, and what masks them is not.
-        _ if material.classic_microfacets.is_some() => {
-            return Err(
-                "classical microfacets have no counterpart: grooves or a term of one cosine mask them, in Mitsuba Smith's term does".into(),
-            );
-        }
         Some(conductor) => rgb("eta", conductor.eta) + &rgb("k", conductor.k),
         // Schlick's factor with F0 = 1 is 1 at every angle.
         None if material.base_color.truncate() == Vec3::ONE => "<string name=\"material\" value=\"none\"/>".into(),
@@ -119,7 +113,26 @@ fn metal(material: &Material, alpha: f32) -> Result<String, String> {
             return Err("a metal by Schlick's Fresnel factor has no counterpart; give it a measured conductor".into());
         }
     };
-    Ok(microfacet("conductor", alpha, &index))
+    let distribution = distribution(material.classic_microfacets)?;
+    Ok(microfacet("conductor", alpha, distribution, &index))
+}
+
+/// Mitsuba's name of a metal's distribution, which it masks by the product of Smith's terms.
+fn distribution(microfacets: Option<Microfacets>) -> Result<&'static str, String> {
+    let Some(Microfacets { distribution, geometry }) = microfacets else {
+        return Ok("ggx");
+    };
+    if geometry != Geometry::Smith {
+        return Err(
+            "classical microfacets that grooves or a term of one cosine mask have no counterpart, in Mitsuba Smith's term does"
+                .into(),
+        );
+    }
+    match distribution {
+        Distribution::Ggx => Ok("ggx"),
+        Distribution::Beckmann => Ok("beckmann"),
+        Distribution::CosineLobe => Err("the cosine lobe of classical microfacets has no counterpart".into()),
+    }
 }
 
 /// Refuses bodies that are not solid, clear and colourless.
@@ -153,16 +166,16 @@ fn solid(material: &Material, alpha: f32) -> Result<String, String> {
         "<float name=\"int_ior\" value=\"{}\"/><float name=\"ext_ior\" value=\"1\"/>",
         material.ior
     );
-    Ok(microfacet("dielectric", alpha, &index))
+    Ok(microfacet("dielectric", alpha, "ggx", &index))
 }
 
 /// The smooth or the rough plugin of a family.
-fn microfacet(family: &str, alpha: f32, index: &str) -> String {
+fn microfacet(family: &str, alpha: f32, distribution: &str, index: &str) -> String {
     if alpha < MIRROR_ALPHA {
         return format!("<bsdf type=\"{family}\">{index}</bsdf>");
     }
     format!(
-        "<bsdf type=\"rough{family}\">{index}<string name=\"distribution\" value=\"ggx\"/>\
+        "<bsdf type=\"rough{family}\">{index}<string name=\"distribution\" value=\"{distribution}\"/>\
          <boolean name=\"sample_visible\" value=\"true\"/><float name=\"alpha\" value=\"{alpha}\"/></bsdf>"
     )
 }

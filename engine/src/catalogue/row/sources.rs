@@ -145,6 +145,7 @@ sources! {
     RAMAMOORTHI_HANRAHAN_2001 = "ramamoorthi-hanrahan-2001": "R. Ramamoorthi, P. Hanrahan", "An Efficient Representation for Irradiance Environment Maps", "SIGGRAPH", 2001;
     REEVES_1987 = "reeves-1987": "W. Reeves, D. Salesin, R. Cook", "Rendering Antialiased Shadows with Depth Maps", "SIGGRAPH", 1987;
     REINHARD_2002 = "reinhard-2002": "E. Reinhard, M. Stark, P. Shirley, J. Ferwerda", "Photographic Tone Reproduction for Digital Images", "SIGGRAPH", 2002;
+    RIBARDIERE_2017 = "ribardiere-2017": "M. Ribardière, B. Bringier, D. Meneveaux, L. Simonot", "STD: Student's t-Distribution of Slopes for Microfacet Based BSDFs", "CGF 36(2)", 2017;
     RITSCHEL_2008 = "ritschel-2008": "T. Ritschel et al.", "Imperfect Shadow Maps for Efficient Computation of Indirect Illumination", "SIGGRAPH Asia", 2008;
     ROUSSELLE_2011 = "rousselle-2011": "F. Rousselle, C. Knaus, M. Zwicker", "Adaptive Sampling and Reconstruction using Greedy Error Minimization", "SIGGRAPH Asia", 2011;
     SAITO_TAKAHASHI_1990 = "saito-takahashi-1990": "T. Saito, T. Takahashi", "Comprehensible Rendering of 3-D Shapes", "SIGGRAPH", 1990;

@@ -1,20 +1,22 @@
 //! A conductor by two colours: its reflectance at normal incidence and a tint of its edge.
 //!
 //! Source: Gulbrandsen, "Artist Friendly Metallic Fresnel" (JCGT 3(4), 2014). For a reflectance r, n lies between (1 − r)/(1 + r), where the tint g
-//! is 1, and (1 + √r)/(1 − √r), where g and k are zero; k follows from r. Guarantees: the two mappings are inverse to each other; a metal keeps its
-//! reflectance at normal incidence.
+//! is 1, and N = (1 + √r)/(1 − √r), where g and k are zero; k² = (n − 1/N)(N − n) follows from r. Guarantees: the two mappings are inverse to each other;
+//! a metal keeps its reflectance at normal incidence. [`artistic_index`] is the twin of that in `transport/fresnel_forms.glsl`.
 
 use glam::{DVec3, Vec3};
 
 use crate::catalogue::{Role, Row, sources};
+use crate::gpu::shaders::constants;
 use crate::scene::ConductorIor;
 
 /// Greatest reflectance: 1 would need an infinite index.
-pub const REFLECTANCE_MAX: f64 = 0.9999;
+pub const REFLECTANCE_MAX: f64 = constants::REFLECTANCE_MAX as f64;
 
 /// Least and greatest real part of an index that reflects `r` at normal incidence.
 fn range(r: f64) -> [f64; 2] {
-    [(1.0 - r) / (1.0 + r), (1.0 + r.sqrt()) / (1.0 - r.sqrt())]
+    let above = 1.0 + r.sqrt();
+    [(1.0 - r) / (1.0 + r), above * above / (1.0 - r)]
 }
 
 /// n and k of a reflectance at normal incidence, cut off at [`REFLECTANCE_MAX`], and an edge tint in [0, 1].
@@ -26,7 +28,7 @@ pub fn artistic_index(reflectance: DVec3, edge_tint: DVec3) -> [DVec3; 2] {
         );
         let [least, greatest] = range(r);
         let n = g * least + (1.0 - g) * greatest;
-        let k2 = ((n + 1.0).powi(2) * r - (n - 1.0).powi(2)) / (1.0 - r);
+        let k2 = (n - 1.0 / greatest) * (g * (greatest - least));
         [n, k2.max(0.0).sqrt()]
     };
     let bands = [0, 1, 2].map(band);
@@ -64,8 +66,10 @@ pub(crate) const ROWS: &[Row] = &[Row {
     role: Role::PartOf("BG-3"),
     limits: "Reflectances up to 0.9999; a tint moves the dip near grazing incidence, but not where it lies.",
     sources: &[sources::GULBRANDSEN_2014.whole()],
+    shaders: &["shaders/transport/fresnel_forms.glsl"],
     tests: &[
         "engine/src/scene/metals/artistic.rs::two_colours_and_an_index_are_one",
+        "tests/tests/twins/fresnel_forms.rs::colours_agree_with_their_twin",
         "engine/tests/scene_load.rs::metals_are_named_measured_or_coloured_and_name_their_form",
     ],
     experiment: "clerestory metal gold",

@@ -17,7 +17,7 @@
 //! vase = { metal = "gold", fresnel = "compensated" }  # exact, schlick, rescaled, compensated, f82-tint, hoffman, simplified
 //! cup = { reflectance = [0.9, 0.7, 0.4], edge_tint = [0.8, 0.6, 0.5] }
 //! coin = { spectrum = "coin.csv" }                    # lines of a wavelength in nanometres, n, k
-//! pan = { metal = "copper", distribution = "beckmann", geometry = "cook-torrance" }  # ggx, beckmann, cosine-lobe; cook-torrance, simplified
+//! pan = { metal = "copper", distribution = "beckmann", geometry = "cook-torrance" }  # ggx, beckmann, cosine-lobe; cook-torrance, simplified, smith
 //!
 //! [phong]                       # by material name: the modified Phong model in place of metal and coat; no transmission
 //! floor = { exponent = 50.0, share = 0.4 }    # of the reflectance, the base colour; the rest is Lambert's
@@ -100,7 +100,7 @@ struct EnvironmentTable {
     untagged,
     expecting = "a metal's name, or a table with metal, spectrum, eta and k, or reflectance and edge_tint, and if wanted fresnel: exact, \
                  schlick, rescaled, compensated, f82-tint, hoffman or simplified; distribution: ggx, beckmann or cosine-lobe; geometry: \
-                 cook-torrance or simplified"
+                 cook-torrance, simplified or smith"
 )]
 enum Metal {
     Named(String),

@@ -6,17 +6,19 @@ use glam::DVec3;
 
 use super::{
     BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_IMPORTANCE,
-    BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_TINTED_CONDUCTOR, Bsdf,
-    BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed,
-    mean3,
+    BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G,
+    BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR,
+    LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
 };
 use crate::transport::albedo::{albedo_average, albedo_layer, albedo_lookup};
 use crate::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
 use crate::transport::fresnel::simplified::fresnel_simplified;
 use crate::transport::fresnel::tinted::fresnel_tinted;
 use crate::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_f0, fresnel_schlick};
-use crate::transport::ggx::{ggx_d, ggx_visible_pdf};
-use crate::transport::microfacets::{beckmann_d, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, kelemen_g};
+use crate::transport::ggx::{ggx_d, ggx_g1, ggx_visible_pdf};
+use crate::transport::microfacets::{
+    beckmann_d, beckmann_g1, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, cosine_lobe_g1, kelemen_g, smith_g,
+};
 
 /// Reflectances of the two lobes that are sampled by the cosine: the diffuse base and the metal's multiple scattering.
 pub(super) struct CosineLobes {
@@ -65,11 +67,7 @@ impl BsdfContext<'_> {
         } else {
             (ggx_d(h, b.alpha), ggx_visible_pdf(wo, h, b.alpha))
         };
-        let g = if b.flags & BSDF_SIMPLIFIED_G != 0 {
-            kelemen_g(wi, h)
-        } else {
-            cook_torrance_g(wi, wo, h)
-        };
+        let g = classic_g(b, wo, wi, h);
         (self.metal_fresnel(b, cos_h) * (d * g * wi.z), normals / (4.0 * cos_h))
     }
 
@@ -214,6 +212,28 @@ impl BsdfContext<'_> {
             f += lobes.metal * (loss / (1.0 - albedo_average(self.table, 0, b.alpha)));
         }
         f * FRAC_1_PI
+    }
+}
+
+/// Smith's masking of one direction by a classical metal.
+fn classic_g1(b: &Bsdf, w: DVec3) -> f64 {
+    if b.flags & BSDF_BECKMANN != 0 {
+        beckmann_g1(w, b.alpha)
+    } else if b.flags & BSDF_COSINE_LOBE != 0 {
+        cosine_lobe_g1(w, cosine_lobe_exponent(b.alpha))
+    } else {
+        ggx_g1(w.z, b.alpha)
+    }
+}
+
+/// The geometric term of a classical metal, over 4 (n·ωi)(n·ωo).
+fn classic_g(b: &Bsdf, wo: DVec3, wi: DVec3, h: DVec3) -> f64 {
+    if b.flags & BSDF_SIMPLIFIED_G != 0 {
+        kelemen_g(wi, h)
+    } else if b.flags & BSDF_SMITH_G != 0 {
+        smith_g(wi, wo, classic_g1(b, wi), classic_g1(b, wo))
+    } else {
+        cook_torrance_g(wi, wo, h)
     }
 }
 

@@ -61,7 +61,7 @@ pub const BSDF_COMPENSATED_CONDUCTOR: u32 = constants::BSDF_COMPENSATED_CONDUCTO
 pub const BSDF_TINTED_CONDUCTOR: u32 = constants::BSDF_TINTED_CONDUCTOR;
 /// The metal is `conductor_a` + i `conductor_b` by the simplified factor.
 pub const BSDF_SIMPLIFIED_CONDUCTOR: u32 = constants::BSDF_SIMPLIFIED_CONDUCTOR;
-/// The metal's microfacets are not GGX's under Smith's masking; with the next three bits it says which they are.
+/// The metal's microfacets are not GGX's under Smith's masking with compensation; with the next four bits it says which they are.
 pub const BSDF_CLASSIC: u32 = constants::BSDF_CLASSIC;
 /// Beckmann's distribution.
 pub const BSDF_BECKMANN: u32 = constants::BSDF_BECKMANN;
@@ -69,6 +69,8 @@ pub const BSDF_BECKMANN: u32 = constants::BSDF_BECKMANN;
 pub const BSDF_COSINE_LOBE: u32 = constants::BSDF_COSINE_LOBE;
 /// The simplified geometric term in place of Cook and Torrance's.
 pub const BSDF_SIMPLIFIED_G: u32 = constants::BSDF_SIMPLIFIED_G;
+/// Smith's term of both directions apart in place of it.
+pub const BSDF_SMITH_G: u32 = constants::BSDF_SMITH_G;
 /// ωo is where particles come from: refraction is not scaled by 1/η².
 pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;
 /// The metal is a modified Phong lobe of constant reflectance `base_color`, of the exponent that `alpha` stands for
@@ -353,9 +355,10 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/bsdf/tests.rs::white_furnace",
             "engine/src/transport/bsdf/tests.rs::reflection_is_reciprocal_and_transmission_up_to_eta_squared",
             "engine/src/transport/bsdf/tests.rs::samples_follow_their_density",
+            "engine/src/transport/bsdf/tests.rs::classical_metals_are_the_product_of_their_parts",
             "tests/tests/twins/scattering.rs::the_scattering_function_agrees_with_its_twin",
         ],
-        experiment: "clerestory agreement --scene furnace-metal,furnace-glass",
+        experiment: "clerestory agreement --scene furnace-metal,furnace-glass,cornell-beckmann",
         settings: &["separable_masking"],
         api: &["clerestory::transport::bsdf"],
         ..Row::of(file!())

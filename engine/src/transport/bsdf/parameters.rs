@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::{
     BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_PHONG,
-    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_THIN, BSDF_TINTED_CONDUCTOR,
-    ETA_MATCHED,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G, BSDF_THIN,
+    BSDF_TINTED_CONDUCTOR, ETA_MATCHED,
 };
 use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets};
 use crate::transport::fresnel::form::MetalFresnel;
@@ -60,6 +60,7 @@ pub(crate) fn classic_flags(microfacets: Microfacets) -> u32 {
     let geometry = match microfacets.geometry {
         Geometry::CookTorrance => 0,
         Geometry::Simplified => BSDF_SIMPLIFIED_G,
+        Geometry::Smith => BSDF_SMITH_G,
     };
     BSDF_CLASSIC | distribution | geometry
 }

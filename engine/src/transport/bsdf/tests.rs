@@ -50,21 +50,24 @@ fn direction(cos_theta: f64, phi: f64) -> DVec3 {
 }
 
 /// Every pairing of a distribution with a geometric term.
-fn classical() -> [(&'static str, Microfacets); 6] {
+fn classical() -> [(&'static str, Microfacets); 9] {
     let of = |distribution, geometry| Microfacets { distribution, geometry };
     [
         ("GGX, Cook and Torrance", of(Distribution::Ggx, Geometry::CookTorrance)),
         ("GGX, simplified", of(Distribution::Ggx, Geometry::Simplified)),
+        ("GGX, Smith", of(Distribution::Ggx, Geometry::Smith)),
         (
             "Beckmann, Cook and Torrance",
             of(Distribution::Beckmann, Geometry::CookTorrance),
         ),
         ("Beckmann, simplified", of(Distribution::Beckmann, Geometry::Simplified)),
+        ("Beckmann, Smith", of(Distribution::Beckmann, Geometry::Smith)),
         (
             "lobe, Cook and Torrance",
             of(Distribution::CosineLobe, Geometry::CookTorrance),
         ),
         ("lobe, simplified", of(Distribution::CosineLobe, Geometry::Simplified)),
+        ("lobe, Smith", of(Distribution::CosineLobe, Geometry::Smith)),
     ]
 }
 
@@ -201,8 +204,10 @@ fn specular_zero_is_exactly_lambert() {
 /// White metals of classical microfacets: their product, and no more light than comes in.
 #[test]
 fn classical_metals_are_the_product_of_their_parts() {
-    use crate::transport::ggx::ggx_d;
-    use crate::transport::microfacets::{beckmann_d, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, kelemen_g};
+    use crate::transport::ggx::{ggx_d, ggx_g1};
+    use crate::transport::microfacets::{
+        beckmann_d, beckmann_g1, cook_torrance_g, cosine_lobe_d, cosine_lobe_exponent, cosine_lobe_g1, kelemen_g,
+    };
     for (name, microfacets) in classical() {
         for alpha in [0.1f64, 0.4, 1.0] {
             let material = Material {
@@ -228,6 +233,14 @@ fn classical_metals_are_the_product_of_their_parts() {
                 let g = match microfacets.geometry {
                     Geometry::CookTorrance => cook_torrance_g(wi, wo, h),
                     Geometry::Simplified => kelemen_g(wi, h),
+                    Geometry::Smith => {
+                        let [masked_i, masked_o] = [wi, wo].map(|w| match microfacets.distribution {
+                            Distribution::Ggx => ggx_g1(w.z, b.alpha),
+                            Distribution::Beckmann => beckmann_g1(w, b.alpha),
+                            Distribution::CosineLobe => cosine_lobe_g1(w, cosine_lobe_exponent(b.alpha)),
+                        });
+                        masked_i * masked_o / (4.0 * wi.z * wo.z)
+                    }
                 };
                 let (f, _) = bsdf_eval_pdf(&c, &b, wo, wi, LOBE_ALL);
                 assert!((f.x - d * g * wi.z).abs() <= 1e-9 * f.x, "{name}: {f} {d} {g}");

@@ -13,6 +13,7 @@ use crate::gpu::shaders::constants;
 use crate::gpu::shaders::transport::fresnel_curve as kernel;
 use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass};
 use crate::scene::ConductorIor;
+use crate::scene::metals::artistic::artistic_parameters;
 use crate::{Error, Result};
 
 /// What is evaluated, and from what.
@@ -37,13 +38,15 @@ pub enum CurveForm {
     Tinted,
     /// The simplified factor from n and k.
     Simplified,
+    /// The simplified factor from its normal reflectance and edge tint, of which n and k are made each time.
+    Artistic,
     /// A look-up of the exact factor times the simplified geometric term.
     Table,
 }
 
 impl CurveForm {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Nothing,
         Self::Exact,
         Self::Schlick,
@@ -53,6 +56,7 @@ impl CurveForm {
         Self::CompensatedF0,
         Self::Tinted,
         Self::Simplified,
+        Self::Artistic,
         Self::Table,
     ];
 
@@ -67,6 +71,7 @@ impl CurveForm {
             Self::CompensatedF0 => constants::CURVE_COMPENSATED_F0,
             Self::Tinted => constants::CURVE_TINTED,
             Self::Simplified => constants::CURVE_SIMPLIFIED,
+            Self::Artistic => constants::CURVE_ARTISTIC,
             Self::Table => constants::CURVE_TABLE,
         }
     }
@@ -98,6 +103,10 @@ impl FresnelCurve {
             CurveForm::Tinted => {
                 let [f0, b] = tinted_metal(eta, k, false);
                 [f0, b, DVec3::ZERO]
+            }
+            CurveForm::Artistic => {
+                let [reflectance, edge_tint] = artistic_parameters(eta, k);
+                [reflectance, edge_tint, DVec3::ZERO]
             }
             _ => [conductor_f0(eta, k), DVec3::ZERO, DVec3::ZERO],
         }

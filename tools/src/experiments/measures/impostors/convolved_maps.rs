@@ -1,12 +1,13 @@
 //! Maps that are convolved once for all points: by the cosine for matte surfaces, by lobes for glossy ones.
 //!
-//! Oracles: the exact irradiance of the lit room at the map's place, for the widest lobe, which is the cosine; and the map itself, whose mean a filter keeps, and whose radiance few numbers stand for.
+//! Oracles: the exact irradiance of the lit room at the map's place, for the widest lobe, which is the cosine; sums of many directions for powers of it; and the map itself, whose mean
+//! a filter keeps, and whose radiance few numbers stand for.
 
 use std::f64::consts::PI;
 
 use clerestory::Result;
-use clerestory::maps::gather::GatherPoint;
 use clerestory::maps::gather::lit_room::{LitRoom, relative_errors};
+use clerestory::maps::gather::{GatherPoint, Lobe, SolidAngleForm, Terms};
 use clerestory::maps::harmonics::HarmonicLight;
 use clerestory::maps::irradiance::IrradianceSource;
 use clerestory::maps::prefilter::prefilter_ggx;
@@ -22,7 +23,14 @@ use crate::metal_forms::sheet;
 const SIDES: [u32; 2] = [32, 16];
 /// Widths of lobes; at 1 the lobe is the cosine.
 const ALPHAS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
+/// Exponents of the lobes of Phong's model: those of the thesis, with a narrower one before and the cosine behind.
+const EXPONENTS: [f64; 4] = [50.0, 10.0, 5.0, 1.0];
+/// Lights along a side of a face that these lobes sum over.
+const LIGHTS: u32 = 32;
+/// Directions along the sides of the faces of a cube that their oracle sums over.
+const DIRECTIONS: u32 = 192;
 const PICTURE: &str = "convolved.png";
+const LOBES: &str = "powers.png";
 
 rows! {
     /// A convolved map.
@@ -34,6 +42,17 @@ rows! {
         mean: f64 = "mean over that of the map",
         brightest: f64 = "brightest texel over the mean",
         off: Option<f64> = "RMS against the exact irradiance (%)",
+    }
+}
+rows! {
+    /// A map convolved by a power of the cosine.
+    struct Lobes = "Maps of a lit room convolved by powers of the cosine" by [exponent] {
+        exponent: f64 = "exponent of the lobe about the mirrored direction",
+        contrast: f64 = "deviation over the mean",
+        of_narrower: Option<f64> = "deviation over that of the next greater exponent",
+        mean: f64 = "mean over that of the map",
+        brightest: f64 = "brightest texel over the mean",
+        off: f64 = "RMS against exact lobes (%)",
     }
 }
 rows! {
@@ -61,6 +80,7 @@ rows! {
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
     maps: Vec<Row>,
+    lobes: Vec<Lobes>,
     harmonics: Vec<Harmonics>,
     wavelets: Vec<Wavelets>,
 }
@@ -182,6 +202,76 @@ const CRITERIA: &[Criterion<Row>] = &[
     .because("a texel has one direction"),
 ];
 
+const OF_LOBES: &[Criterion<Lobes>] = &[
+    Criterion::each(
+        "less shininess blurs more: deviation over that of the next greater exponent",
+        Bound::AtMost(0.95),
+        |row: &Lobes| row.of_narrower.unwrap_or(f64::NAN).into(),
+    )
+    .among(|row| row.of_narrower.is_some())
+    .in_every_form(),
+    Criterion::each(
+        "powers of the cosine lose no light: mean over that of the map",
+        Bound::Between(0.98, 1.02),
+        |row: &Lobes| row.mean.into(),
+    )
+    .because("as for other lobes"),
+    Criterion::each(
+        "powers of the cosine are those of the room: RMS against exact lobes (%)",
+        Bound::AtMost(3.0),
+        |row: &Lobes| row.off.into(),
+    )
+    .because("a light is 3° wide and has one direction, the narrowest lobe is 13° to half of its height"),
+];
+
+/// The map convolved by powers of the cosine: what its lights give at its own place.
+fn lobes(context: &Context<'_>, room: &LitRoom, of_map: f64) -> Result<Vec<Lobes>> {
+    let (side, count, to, directions) = context.pick((LIGHTS, 400, SIDES[1], DIRECTIONS), (8, 20, 4, 16));
+    let lights = room.lights(side, SolidAngleForm::Disc)?;
+    let gathered = |axis: DVec3, exponent: f64| {
+        let position = DVec3::ZERO;
+        lights
+            .gather(&GatherPoint { position, axis }, Lobe::Middles(exponent), Terms::All)
+            .x
+    };
+    let points: Vec<GatherPoint> = LitRoom::points(DVec3::ZERO, count)
+        .into_iter()
+        .map(|point| GatherPoint {
+            position: DVec3::ZERO,
+            ..point
+        })
+        .collect();
+    let (kind, size) = (Parametrization::Cube, UVec2::splat(to));
+    let mut shown = Vec::new();
+    let mut last = None;
+    let rows = context.each(
+        &EXPONENTS,
+        |exponent| format!("exponent {exponent}"),
+        |exponent| {
+            let map = MapImage::from_fn(kind, size, |texel| {
+                let axis = kind.texel_direction(size, texel);
+                DVec3::splat(axis.map_or(0.0, |axis| gathered(axis, *exponent)))
+            })?;
+            let [mean, deviation] = statistics(&map);
+            let of_narrower = last.replace(deviation).map(|narrower: f64| deviation / narrower);
+            let brightest = map.texels().iter().fold(0.0f32, |most, texel| most.max(texel.x));
+            let found: Vec<f64> = points.iter().map(|point| gathered(point.axis, *exponent)).collect();
+            let exact = room.glossy(&points, *exponent, directions);
+            shown.push(unfolded(&map, 2.0 * of_map));
+            Ok(vec![Lobes {
+                exponent: *exponent,
+                contrast: deviation / mean,
+                of_narrower,
+                mean: mean / of_map,
+                brightest: f64::from(brightest) / mean,
+                off: relative_errors(&found, &exact)[0],
+            }])
+        },
+    )?;
+    context.picture(LOBES, &sheet(&shown, 3 * to, EXPONENTS.len() as u32));
+    Ok(rows)
+}
+
 /// Mean and deviation over all directions.
 fn statistics(map: &MapImage) -> [f64; 2] {
     let (kind, size) = (map.map(), map.size());
@@ -252,6 +342,7 @@ impl Study for Found {
         context.picture(PICTURE, &sheet(&shown, 3 * to, ALPHAS.len() as u32));
         Ok(Self {
             maps: rows,
+            lobes: lobes(context, &room, of_map)?,
             harmonics: harmonics(&room, &radiance, context.pick(400, 20))?,
             wavelets: wavelets(&room, &radiance, context.pick(400, 20))?,
         })
@@ -265,6 +356,10 @@ impl Study for Found {
                 widest.and_then(|row| row.off).map(Into::into),
             )
             .note("A cube of 32² texels a face of a room with walls of different radiance and a bright patch, seen from its middle, convolved into 16² texels a face.")
+            .and(Findings::of(&self.lobes, OF_LOBES).note(
+                "A look-up in such a map by the mirrored direction is the model by Phong, as the thesis has it for glossy surfaces; its exponents are 5 and 10. Here the map is of 16² \
+                 texels a face, each the sum of 32² lights a face of the same room.",
+            ))
             .and(Findings::of(&self.harmonics, OF_HARMONICS).note("Of the same map, in place of a convolved one; the third and the fifth order add nothing to irradiance."))
             .and(Findings::of(&self.wavelets, OF_WAVELETS).note("Of the same map; what is lost is the squared error over the square of the radiance, in the mean over all directions. A wavelet takes its place beside its value."))
             .curves(
@@ -276,9 +371,11 @@ impl Study for Found {
         if self.maps.is_empty() {
             return findings;
         }
-        findings.picture(
-            PICTURE,
-            "Faces +x, −x, +y and −y, +z, −z of the convolved maps, from narrow lobes to the cosine",
-        )
+        findings
+            .picture(
+                PICTURE,
+                "Faces +x, −x, +y and −y, +z, −z of the convolved maps, from narrow lobes to the cosine",
+            )
+            .picture(LOBES, "The same by powers of the cosine: exponents 50, 10, 5 and 1")
     }
 }

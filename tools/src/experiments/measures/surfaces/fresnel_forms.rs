@@ -3,13 +3,16 @@
 //! Oracles: the exact factor in f64, which a unit test holds to the complex form; and the errors that were published.
 
 use clerestory::Result;
+use clerestory::scene::metals::artistic::{artistic_index, artistic_parameters};
 use clerestory::scene::{ConductorIor, FresnelForm, metals};
 use clerestory::transport::fresnel::curve::{CurveForm, FresnelCurve};
 use clerestory::transport::fresnel::form::MetalFresnel;
+use clerestory::transport::fresnel::simplified::fresnel_simplified;
 use clerestory::transport::fresnel::table::{NODES, fresnel_table, fresnel_table_lookup};
 use clerestory::transport::fresnel::{fresnel_conductor, rescaled::fresnel_schlick_index};
 use glam::{DVec3, Vec3};
 
+use super::fresnel_curves::MetalCurves;
 use super::fresnel_dips::Dips;
 use super::fresnel_rescaling::Rescaling;
 use super::published_metals::{PUBLISHED, Published};
@@ -109,6 +112,7 @@ pub struct Found {
     errors: Vec<Row>,
     headlines: Vec<Headline>,
     gold: Vec<Gold>,
+    metal_curves: MetalCurves,
     dips: Dips,
     rescaling: Rescaling,
     points: Vec<Point>,
@@ -189,7 +193,7 @@ fn errors(metal: &str, wavelength: f64, published: Option<&Published>, steps: u3
     };
     let [n, k] = spectrum.at(wavelength);
     let rescaled = FormError::of(Way::Form(FresnelForm::Rescaled), n, k, steps).worst;
-    let [reflectance, tint] = metals::artistic::artistic_parameters(DVec3::splat(n), DVec3::splat(k)).map(|v| v.x);
+    let [reflectance, tint] = artistic_parameters(DVec3::splat(n), DVec3::splat(k)).map(|v| v.x);
     let finite = |x: f64| x.is_finite().then_some(x);
     let of = |way: Way| {
         let published = published.and_then(|published| published_error(published, way));
@@ -261,6 +265,12 @@ fn on_host(form: CurveForm, ior: &ConductorIor) -> Box<dyn Fn(f64) -> DVec3> {
         CurveForm::Compensated | CurveForm::CompensatedF0 => of(FresnelForm::Compensated),
         CurveForm::Tinted => of(FresnelForm::Hoffman),
         CurveForm::Simplified => of(FresnelForm::Simplified),
+        CurveForm::Artistic => {
+            // The device is given both colours in single precision.
+            let [reflectance, tint] = artistic_parameters(eta, k).map(|color| color.as_vec3().as_dvec3());
+            let [eta, k] = artistic_index(reflectance, tint);
+            Box::new(move |c| fresnel_simplified(c, eta, k))
+        }
         CurveForm::Table => {
             let table = fresnel_table(|c| fresnel_conductor(c, eta, k));
             debug_assert_eq!(table.len(), NODES);
@@ -385,6 +395,7 @@ impl Study for Found {
             errors,
             headlines: headlines.into(),
             gold: gold(steps),
+            metal_curves: MetalCurves::measure(context),
             dips: Dips::measure(context),
             rescaling: Rescaling::measure(context),
             points: [points("aluminium", 700.0), points("gold", 550.0)].concat(),
@@ -430,6 +441,7 @@ impl Study for Found {
             .and(Findings::of(&self.points, &[]).long())
             .curves("aluminium", "Errors for aluminium at 700 nm", axes, curves(&of_metal("aluminium"), |p| p.form.clone(), at))
             .curves("gold", "Errors for gold at 550 nm", axes, curves(&of_metal("gold"), |p| p.form.clone(), at))
+            .and(self.metal_curves.findings())
             .and(self.dips.findings())
             .and(self.rescaling.findings())
     }

@@ -18,7 +18,7 @@ use crate::metal_forms::sheet;
 
 /// Wavelengths of red, green and blue, nm.
 const WAVELENGTHS: [f64; 3] = [700.0, 550.0, 435.0];
-const METALS: [&str; 9] = [
+const METALS: [&str; 10] = [
     "copper",
     "gold",
     "silver",
@@ -28,6 +28,7 @@ const METALS: [&str; 9] = [
     "chromium",
     "nickel",
     "titanium",
+    "cobalt",
 ];
 const FORMS: [FresnelForm; 3] = [FresnelForm::Schlick, FresnelForm::Rescaled, FresnelForm::Exact];
 /// Radius of the ring, and of the tube, metres.
@@ -211,7 +212,7 @@ impl Study for Found {
         }
         findings.picture(
             PICTURE,
-            "Three metals a row, each by Schlick's curve, the rescaled one and the exact factor: copper, gold, silver; silver by Hagemann's constants, aluminium, iron; chromium, nickel, titanium",
+            "Three metals a row, each by Schlick's curve, the rescaled one and the exact factor: copper, gold, silver; silver by Hagemann's constants, aluminium, iron; chromium, nickel, titanium; cobalt",
         )
     }
 }

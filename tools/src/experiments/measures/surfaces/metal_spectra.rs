@@ -3,21 +3,17 @@
 //! Oracle: the same picture in 41 bins of wavelengths, whose sum a test holds to a closed form. The scene is a half pipe of the metal under a white sky, seen from above: each ray is
 //! reflected once or more often, from normal to grazing incidence, and comes to the same radiance, so that pictures have no noise but that of pixels' places, which is common to all.
 
-use std::f64::consts::PI;
-
 use clerestory::Result;
-use clerestory::film::picture::RADIANCE;
 use clerestory::gpu::Gpu;
-use clerestory::render::spectral::{SpectralMetal, render_spectral};
-use clerestory::render::{RenderOptions, render};
+use clerestory::render::RenderOptions;
+use clerestory::scene::FresnelForm;
 use clerestory::scene::metals::bins::Bins;
-use clerestory::scene::metals::{self, IndexSpectrum};
-use clerestory::scene::{Camera, Environment, FresnelForm, Material, Mesh, Projection, Scene};
 use clerestory::techniques::PathTracerSettings;
-use clerestory::transport::fresnel::curve::{CurveForm, FresnelCurve};
+use clerestory::transport::fresnel::curve::FresnelCurve;
 use clerestory::transport::fresnel::extinction::{wave_envelope, wave_field};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
+use super::spectral_ways::{ASPECT, Way, bins_name, spectrum_of};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
 use crate::metal_forms::sheet;
@@ -38,16 +34,10 @@ const METALS: [&str; 9] = [
 const GREY: &str = "grey";
 /// Bins of the oracle.
 const ORACLE: u32 = 41;
-/// Wavelengths in the place of red, green and blue, nm.
-const WAVELENGTHS: [f64; 3] = [700.0, 550.0, 435.0];
 /// Evaluations of an invocation whose time is taken.
 const CHAIN: u32 = 64;
 const TURNS: usize = 9;
 const PICTURE: &str = "troughs.png";
-/// Facets of the half pipe.
-const FACETS: u32 = 64;
-/// How far from the middle the half pipe of radius 1 is seen: beyond, light is reflected very often.
-const SEEN: f32 = 0.95;
 
 rows! {
     /// A way to make a metal's picture.
@@ -76,6 +66,16 @@ rows! {
 }
 
 rows! {
+    /// A metal at an end of the range that the thesis names.
+    struct End = "Fall of two metals' n from 430 to 705 nm" by [metal, wavelength] {
+        metal: String = "metal",
+        wavelength: f64 = "wavelength (nm)",
+        n: f64 = "n",
+        published: f64 = "published n",
+    }
+}
+
+rows! {
     /// A place inside a material with n = 1.2, at 400 nm.
     struct Wave = "Waves inside a material" by [extinction, depth] {
         extinction: f64 = "k",
@@ -91,6 +91,7 @@ rows! {
 pub struct Found {
     errors: Vec<Row>,
     indices: Vec<Index>,
+    ends: Vec<End>,
     waves: Vec<Wave>,
 }
 
@@ -147,6 +148,13 @@ const OF_ERRORS: &[Criterion<Row>] = &[
     .among(|row| row.metal == "copper" && row.way == FresnelForm::Schlick.name())
     .because("its green and blue reflect 0.6 and 0.5, where the curve has next to nothing"),
 ];
+const OF_ENDS: &[Criterion<End>] = &[Criterion::each(
+    "n of gold falls from 1.45 to 0.13 and that of copper from 1.25 to 0.21: difference from these",
+    Bound::AtMost(5e-3),
+    |row: &End| (row.n - row.published).abs().into(),
+)
+.because("half of the last published digit")
+.in_every_form()];
 const OF_WAVES: &[Criterion<Wave>] = &[Criterion::each(
     "envelopes are the published ones: their difference",
     Bound::AtMost(5e-4),
@@ -154,119 +162,6 @@ const OF_WAVES: &[Criterion<Wave>] = &[Criterion::each(
 )
 .among(|row| row.published.is_some())
 .in_every_form()];
-
-fn bins_name(count: u32) -> String {
-    format!("{count} bins")
-}
-
-/// A way to make a picture.
-#[derive(Debug, Clone, Copy)]
-enum Way {
-    /// A form in channels.
-    Channels(FresnelForm),
-    /// The exact factor at three wavelengths.
-    Wavelengths,
-    /// The exact factor in so many bins.
-    Bins(u32),
-}
-
-impl Way {
-    fn name(self) -> String {
-        match self {
-            Self::Channels(form) => form.name().into(),
-            Self::Wavelengths => "three wavelengths".into(),
-            Self::Bins(count) => bins_name(count),
-        }
-    }
-
-    const fn pictures(self) -> u32 {
-        match self {
-            Self::Channels(_) | Self::Wavelengths => 1,
-            Self::Bins(count) => count.div_ceil(3),
-        }
-    }
-
-    /// What a device evaluates.
-    const fn curve(self) -> CurveForm {
-        match self {
-            Self::Channels(form) => match form {
-                FresnelForm::Exact => CurveForm::Exact,
-                FresnelForm::Schlick | FresnelForm::Rescaled => CurveForm::RescaledF0,
-                FresnelForm::Compensated => CurveForm::CompensatedF0,
-                FresnelForm::F82Tint | FresnelForm::Hoffman => CurveForm::Tinted,
-                FresnelForm::Simplified => CurveForm::Simplified,
-            },
-            Self::Wavelengths | Self::Bins(_) => CurveForm::Exact,
-        }
-    }
-
-    /// All pixels of the metal's half pipe.
-    fn picture(self, gpu: &Gpu, spectrum: &IndexSpectrum, options: &RenderOptions) -> Result<Vec<DVec3>> {
-        let mut scene = half_pipe();
-        if let Some(material) = scene.materials.first_mut() {
-            material.conductor = Some(match self {
-                Self::Wavelengths => spectrum.at_wavelengths(WAVELENGTHS),
-                _ => spectrum.channels(),
-            });
-            if let Self::Channels(form) = self {
-                material.fresnel = form;
-            }
-        }
-        let picture = match self {
-            Self::Bins(count) => {
-                let metal = SpectralMetal {
-                    material: 0,
-                    spectrum: spectrum.clone(),
-                };
-                render_spectral(gpu, &scene, &[metal], &Bins::new(count)?, options)?.picture
-            }
-            _ => render(gpu, &scene, options)?.picture,
-        };
-        let pixels = picture.require(RADIANCE)?.pixels();
-        Ok(pixels.map(|pixel| Vec3::from_array(pixel).as_dvec3()).collect())
-    }
-}
-
-/// A half pipe of radius 1 under a white sky, whose one material is a mirror.
-fn half_pipe() -> Scene {
-    let mut scene = Scene::default();
-    let metal = scene.add_material(Material::mirror("metal", Vec3::ONE));
-    let edge = |z: f32| {
-        (0..=FACETS).map(move |i| {
-            let angle = PI * f64::from(i) / f64::from(FACETS);
-            Vec3::new(-angle.cos() as f32, 1.0 - angle.sin() as f32, z)
-        })
-    };
-    let other = FACETS + 1;
-    let facet = |i: u32| [[i, i + other, i + 1], [i + 1, i + other, i + other + 1]];
-    scene.place(Mesh {
-        name: "half pipe".into(),
-        positions: edge(-2.0).chain(edge(2.0)).collect(),
-        triangles: (0..FACETS).flat_map(facet).collect(),
-        material: Some(metal),
-        ..Mesh::default()
-    });
-    scene.environment = Some(Environment::uniform(Vec3::ONE));
-    scene.cameras.push(Camera {
-        // Square pixels: the picture is as many times wider than high as the half pipe's part that is seen.
-        projection: Projection::Orthographic {
-            half_height: SEEN / ASPECT as f32,
-        },
-        ..Camera::look_at("main", DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, DVec3::NEG_Z, 1.0)
-    });
-    scene
-}
-
-/// Width over height of pictures.
-const ASPECT: u32 = 16;
-
-fn spectrum_of(metal: &str) -> Result<IndexSpectrum> {
-    let grey = || IndexSpectrum::parse("380 1.4 6.2\n780 1.4 6.2");
-    metals::spectrum(metal).map_or_else(
-        || grey().map_err(|cause| clerestory::Error::setting("metal", metal, cause)),
-        Ok,
-    )
-}
 
 /// The error of a way against the oracle's pixels, without its cost.
 fn row(metal: &str, way: Way, cost: Repeats, pixels: &[DVec3], oracle: &[DVec3]) -> Row {
@@ -293,6 +188,25 @@ fn row(metal: &str, way: Way, cost: Repeats, pixels: &[DVec3], oracle: &[DVec3])
         blue: bias.z,
         over_channels: None,
     }
+}
+
+fn ends() -> Result<Vec<End>> {
+    const PUBLISHED: [(&str, f64, f64); 4] = [
+        ("gold", 430.0, 1.45),
+        ("gold", 705.0, 0.13),
+        ("copper", 430.0, 1.25),
+        ("copper", 705.0, 0.21),
+    ];
+    let of = |(metal, wavelength, published): (&str, f64, f64)| {
+        let [n, _] = spectrum_of(metal)?.at(wavelength);
+        Ok(End {
+            metal: metal.into(),
+            wavelength,
+            n,
+            published,
+        })
+    };
+    PUBLISHED.into_iter().map(of).collect()
 }
 
 fn waves(steps: u32) -> Vec<Wave> {
@@ -326,7 +240,7 @@ impl Study for Found {
         let counts = context.pick(vec![8, 12, 16, 24], vec![8]);
         let oracle = Way::Bins(context.pick(ORACLE, 12));
         let ways: Vec<Way> = (forms.iter().map(|form| Way::Channels(*form)))
-            .chain([Way::Wavelengths])
+            .chain([Way::Colors, Way::Table, Way::Wavelengths])
             .chain(counts.into_iter().map(Way::Bins))
             .collect();
         let metals: Vec<&str> = context
@@ -392,6 +306,7 @@ impl Study for Found {
         Ok(Self {
             errors,
             indices,
+            ends: ends()?,
             waves: waves(context.pick(50, 10)),
         })
     }
@@ -411,10 +326,13 @@ impl Study for Found {
             )
             .note(
                 "Channels are means of n and k over what red, green and blue are sensitive to; ways without a number of bins are in channels, but for the three wavelengths 700, 550 and \
-                 435 nm. Errors are those of the picture in 41 bins, white being 1, over all pixels of a half pipe seen from above. The cost is that of three bands' Fresnel factor on the device in a chain of 64, times \
+                 435 nm. Reflectance and edge tint are those of the channels' n and k, in single precision, by the simplified factor. The table holds the exact factor times the \
+                 simplified geometric term, which is part of its cost; no scene can name it, so that its picture is the exact factor's times what its interpolation does along a \
+                 smooth half pipe. Errors are those of the picture in 41 bins, white being 1, over all pixels of a half pipe seen from above. The cost is that of three bands' Fresnel factor on the device in a chain of 64, times \
                  the number of pictures; all else that a picture takes is multiplied alike.",
             )
             .and(Findings::of(&self.indices, &[]).long())
+            .and(Findings::of(&self.ends, OF_ENDS))
             .and(Findings::of(&self.waves, OF_WAVES).long())
             .curves(
                 "error-and-cost",
