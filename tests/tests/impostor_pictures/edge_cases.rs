@@ -52,6 +52,30 @@ fn without_a_reflector_there_is_no_map() {
     });
 }
 
+/// The map of a gather has normals where its form takes them, whoever draws it.
+#[test]
+fn maps_of_gathers_have_no_normals_unasked() {
+    with_gpu(|gpu| {
+        let mut scene = room_with(Material::lambert("matte", Vec3::splat(0.5)), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut scene, 1.0);
+        let renderer = renderer(gpu, &scene);
+        // Three numbers of radiance and a distance a texel, and one more of a normal.
+        for (form, capture, texel) in [
+            ("disc", "raster", 16),
+            ("disc", "rays", 16),
+            ("disc_with_normals", "raster", 20),
+        ] {
+            let settings = json!({"form": form, "capture": capture, "side": 64, "lights": 16, "capture_samples": 1});
+            let found = rendered(&renderer, "localized-gather", 8, 1, settings);
+            let counters = &found.report.counters;
+            assert!(counters["gathers"] > 0, "{form}, {capture}");
+            assert_eq!(counters["map_bytes"], 64 * 64 * texel, "{form}, {capture}");
+            let skips_normals = found.report.skipped.iter().any(|skipped| skipped.what == "normals");
+            assert_eq!(skips_normals, texel == 16, "{form}, {capture}");
+        }
+    });
+}
+
 #[test]
 fn what_cannot_be_is_refused_by_name() {
     with_gpu(|gpu| {

@@ -174,6 +174,7 @@ const ROWS: &[Row] = &[
             "tests/tests/impostor_pictures/edge_cases.rs::without_a_reflector_there_is_no_map",
             "tests/tests/impostor_pictures/edge_cases.rs::hard_places_give_finite_pictures",
             "tests/tests/impostor_pictures/edge_cases.rs::maps_beyond_a_storage_buffers_range_are_refused",
+            "tests/tests/impostor_pictures/edge_cases.rs::maps_of_gathers_have_no_normals_unasked",
             "tests/tests/impostor_pictures/edge_cases.rs::maps_tell_what_they_took",
         ],
         settings: &["capture", "side", "capture_samples", "shadow_side", "bounces"],

@@ -104,6 +104,7 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/impostor_pictures/gathers.rs::even_surroundings_keep_their_albedo_at_grazing_views",
         "tests/tests/impostor_pictures/gathers.rs::what_is_behind_a_surface_does_not_shine_on_it",
         "tests/tests/impostor_pictures/edge_cases.rs::what_cannot_be_is_refused_by_name",
+        "tests/tests/impostor_pictures/edge_cases.rs::maps_of_gathers_have_no_normals_unasked",
         "engine/src/techniques/localized_gather/settings.rs::bad_settings_are_refused_by_name",
         "engine/src/techniques/localized_gather/settings.rs::the_map_has_no_path_of_the_eye",
     ],
