@@ -56,7 +56,7 @@ impl MapUse for Gathering {
             gpu,
             scene,
             &lights,
-            settings.cones,
+            settings,
             self.place,
             self.triangles.clone(),
         )?);
