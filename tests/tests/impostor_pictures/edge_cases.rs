@@ -1,4 +1,4 @@
-//! What must not be, hard places, and bits.
+//! What must not be, and hard places.
 
 use super::*;
 use clerestory::Error;
@@ -6,7 +6,6 @@ use clerestory::maps::impostor::room::BoxRoom;
 use clerestory::scene::Projection;
 use clerestory::techniques::impostors::{CaptureBy, ImpostorReflections, ReflectionMethod, ReflectionSettings};
 use clerestory::transport::GpuScene;
-use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::builtin;
 use std::sync::Arc;
 
@@ -330,43 +329,6 @@ fn glossy_surroundings_are_mirrored_as_the_maps_place_sees_them() {
                 "{radius}: {whole} {bias}"
             );
         }
-    });
-}
-
-/// Set in the processes that only print their pictures' hash.
-const CHILD: &str = "CLERESTORY_TEST_PRINT_IMPOSTOR_HASH";
-const CHILD_TEST: &str = "edge_cases::prints_its_hash_when_asked";
-
-/// On one thread of the driver and on two, and on vectors of 4, 8 and 16 lanes.
-#[test]
-fn bits_are_the_same_whoever_does_the_work() {
-    let hash = |threads, width| {
-        let variables = [("LP_NUM_THREADS", threads), ("LP_NATIVE_VECTOR_WIDTH", width)];
-        hash_in_child(CHILD_TEST, CHILD, &variables)
-    };
-    let truth = hash("1", "256");
-    assert_eq!(hash("2", "128"), truth);
-    assert_eq!(hash("2", "512"), truth);
-}
-
-#[test]
-fn prints_its_hash_when_asked() {
-    if std::env::var_os(CHILD).is_none() {
-        return;
-    }
-    with_gpu(|gpu| {
-        let mut scene = room_with(mirror(), B, 0.3, EYE, 1.5, 1.0);
-        lamp(&mut scene, 1.0);
-        let renderer = renderer(gpu, &scene);
-        let mut words = Vec::new();
-        for (technique, settings) in [
-            ("impostor", json!({"side": 64})),
-            ("localized-gather", json!({"side": 64, "lights": 16})),
-        ] {
-            let found = rendered(&renderer, technique, 16, 2, settings);
-            words.extend(layer(&found, "radiance").iter().map(|value| value.to_bits()));
-        }
-        print_hash(words);
     });
 }
 
