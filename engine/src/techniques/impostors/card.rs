@@ -135,6 +135,7 @@ const ROWS: &[Row] = &[
             "tests/tests/impostor_pictures/refractions.rs::what_is_seen_in_a_pool_is_absorbed_on_the_way",
             "engine/src/techniques/impostors/interfaces.rs::numbers_are_found_in_ranges_in_their_order",
             "tests/tests/impostor_pictures/edge_cases.rs::glossy_surroundings_are_mirrored_as_the_maps_place_sees_them",
+            "tests/tests/impostor_pictures/edge_cases.rs::hard_places_degrade_as_documented",
             "tests/tests/impostor_pictures/bits.rs::bits_are_the_same_whoever_does_the_work",
             "tests/tests/impostor_pictures/bits.rs::bits_of_maps_by_rays_are_the_same_whoever_does_the_work",
             "engine/src/techniques/impostors/settings.rs::bad_settings_are_refused_by_name",

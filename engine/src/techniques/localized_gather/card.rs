@@ -107,6 +107,7 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/impostor_pictures/gathers.rs::what_is_behind_a_surface_does_not_shine_on_it",
         "tests/tests/impostor_pictures/edge_cases.rs::what_cannot_be_is_refused_by_name",
         "tests/tests/impostor_pictures/edge_cases.rs::maps_of_gathers_have_no_normals_unasked",
+        "tests/tests/impostor_pictures/reflections.rs::scale_changes_nothing",
         "tests/tests/impostor_pictures/bits.rs::bits_are_the_same_whoever_does_the_work",
         "tests/tests/impostor_pictures/bits.rs::bits_of_maps_by_rays_are_the_same_whoever_does_the_work",
         "engine/src/techniques/localized_gather/settings.rs::bad_settings_are_refused_by_name",
