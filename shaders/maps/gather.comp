@@ -11,6 +11,7 @@ layout(local_size_x = 64) in;
 float gather_table_value(uint i);
 
 #include "maps/gather.glsl"
+#include "maps/gather_few.glsl"
 
 layout(push_constant, scalar) uniform Push {
     uint count;
@@ -31,15 +32,6 @@ layout(set = 0, binding = 3, scalar) restrict writeonly buffer Values { vec3 val
 
 float gather_table_value(uint i) { return gather_table[i]; }
 
-// Takes the place of a lesser entry, which it becomes.
-void gather_keep(inout vec4 kept, inout vec4 entry) {
-    if (entry.w > kept.w) {
-        vec4 lesser = kept;
-        kept = entry;
-        entry = lesser;
-    }
-}
-
 void main() {
     uint i = invocation_index();
     if (i >= push.count) {
@@ -47,20 +39,14 @@ void main() {
     }
     GatherPoint point = points[i];
     if (GATHER_FIVE) {
-        // Radiance and term, greatest first.
-        vec4 a = vec4(0.0), b = vec4(0.0), c = vec4(0.0), d = vec4(0.0), e = vec4(0.0);
+        GatherFew few = gather_no_terms();
         for (uint k = 0u; k < push.lights; ++k) {
             GatherRecord light = gather_lights[k];
-            vec4 entry = vec4(light.radiance, gather_term(light, point.position, point.axis, push.exponent, GATHER_CONES));
-            gather_keep(a, entry);
-            gather_keep(b, entry);
-            gather_keep(c, entry);
-            gather_keep(d, entry);
-            gather_keep(e, entry);
+            float term = gather_term(light, point.position, point.axis, push.exponent, GATHER_CONES);
+            gather_add(few, vec4(light.radiance, term));
         }
-        vec3 sum = a.w * a.rgb + b.w * b.rgb + c.w * c.rgb + d.w * d.rgb + e.w * e.rgb;
-        float whole = a.w + b.w + c.w + d.w + e.w;
-        values[i] = GATHER_SCALED && whole > 0.0 ? sum / whole : sum;
+        vec4 sum = gather_sum(few);
+        values[i] = GATHER_SCALED && sum.w > 0.0 ? sum.rgb / sum.w : sum.rgb;
         return;
     }
     vec3 sum = vec3(0.0);

@@ -13,11 +13,9 @@ const uint GATHER_DISC = 1u;
 const uint GATHER_NORMALS = 2u;
 // Lights that are summed by themselves, so that small terms meet small sums.
 const uint GATHER_BLOCK = 64u;
-// Terms that few are.
-const uint GATHER_FEW = 5u;
 
 layout(constant_id = 140) const uint GATHER_FORM = GATHER_DISC;
-// The five greatest terms alone, and whether they are scaled to the whole.
+// The five greatest terms alone (maps/gather_few.glsl), and whether they are scaled to the whole.
 layout(constant_id = 141) const bool GATHER_FIVE = false;
 layout(constant_id = 142) const bool GATHER_SCALED = true;
 // Reflectivities as means over cones, from the table.

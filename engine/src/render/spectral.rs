@@ -102,6 +102,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/scene/metals/bins.rs::channels_lose_what_bins_keep",
         "tests/tests/paths/spectral_metals.rs::bins_are_summed_to_the_colour_of_two_reflections",
         "tests/tests/paths/spectral_metals.rs::grey_metals_have_no_colour_in_bins",
+        "tests/tests/paths/determinism.rs::threads_of_the_driver_never_show_on_metals",
         "tests/tests/paths/spectral_metals.rs::colours_without_a_spectrum_are_refused",
     ],
     api: &[

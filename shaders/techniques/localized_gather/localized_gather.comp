@@ -1,7 +1,7 @@
 #version 460
 // Indirect light where eye paths first arrive at rough surfaces, from the lights that a coarse map's texels stand for: one place an invocation. What cosine-shaped lobes
 // reflect is their albedo times a lobe of exponent 1 about the normal, what microfacets do is theirs times a narrower one about the mirrored direction, of lights before the
-// surface alone, scaled to the whole lobe.
+// surface alone, scaled to the whole lobe: all of them, or the few that count most.
 //
 // Sources, bias and guarantees: techniques/localized_gather/mod.rs; maps/gather/mod.rs. Deterministic: sums in the order of lights, in blocks.
 #extension GL_GOOGLE_include_directive : require
@@ -14,6 +14,7 @@ float gather_table_value(uint i);
 #include "transport/features.glsl"
 #include "walk/wave.glsl"
 #include "maps/gather.glsl"
+#include "maps/gather_few.glsl"
 #include "transport/arrival.glsl"
 #include "transport/microfacet_albedo.glsl"
 
@@ -67,6 +68,7 @@ void gather_at(uint slot, uint place) {
     // Light of the narrower lobe; its weight of all lights and of those before the surface.
     vec3 shining = vec3(0.0);
     vec2 weights = vec2(0.0);
+    GatherFew few = gather_no_terms();
     for (uint first = 0u; first < push.lights; first += GATHER_BLOCK) {
         vec3 block = vec3(0.0);
         vec3 shining_block = vec3(0.0);
@@ -77,6 +79,9 @@ void gather_at(uint slot, uint place) {
             if (is_shiny) {
                 float weight = gather_term(light, x, mirrored_way, exponent, false);
                 float before = dot(frame.z, light.position - x) > 0.0 ? weight : 0.0;
+                if (GATHER_FIVE) {
+                    gather_add(few, vec4(light.radiance, before));
+                }
                 shining_block += before * light.radiance;
                 weights_block += vec2(weight, before);
             }
@@ -84,6 +89,11 @@ void gather_at(uint slot, uint place) {
         sum += block;
         shining += shining_block;
         weights += weights_block;
+    }
+    if (GATHER_FIVE) {
+        vec4 of_few = gather_sum(few);
+        shining = of_few.rgb;
+        weights.y = of_few.w;
     }
     if (weights.y > 0.0) {
         sum += shine * shining * (weights.x / weights.y);

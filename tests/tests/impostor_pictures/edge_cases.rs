@@ -1,4 +1,4 @@
-//! What must not be, hard places, and bits.
+//! What must not be, and hard places.
 
 use super::*;
 use clerestory::Error;
@@ -6,7 +6,6 @@ use clerestory::maps::impostor::room::BoxRoom;
 use clerestory::scene::Projection;
 use clerestory::techniques::impostors::{CaptureBy, ImpostorReflections, ReflectionMethod, ReflectionSettings};
 use clerestory::transport::GpuScene;
-use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::builtin;
 use std::sync::Arc;
 
@@ -49,6 +48,30 @@ fn without_a_reflector_there_is_no_map() {
             [bytes(&classical), bytes(&hybrid)],
             [12, 20].map(|texel| 64 * 64 * texel)
         );
+    });
+}
+
+/// The map of a gather has normals where its form takes them, whoever draws it.
+#[test]
+fn maps_of_gathers_have_no_normals_unasked() {
+    with_gpu(|gpu| {
+        let mut scene = room_with(Material::lambert("matte", Vec3::splat(0.5)), B, 0.3, EYE, 1.5, 1.0);
+        lamp(&mut scene, 1.0);
+        let renderer = renderer(gpu, &scene);
+        // Three numbers of radiance and a distance a texel, and one more of a normal.
+        for (form, capture, texel) in [
+            ("disc", "raster", 16),
+            ("disc", "rays", 16),
+            ("disc_with_normals", "raster", 20),
+        ] {
+            let settings = json!({"form": form, "capture": capture, "side": 64, "lights": 16, "capture_samples": 1});
+            let found = rendered(&renderer, "localized-gather", 8, 1, settings);
+            let counters = &found.report.counters;
+            assert!(counters["gathers"] > 0, "{form}, {capture}");
+            assert_eq!(counters["map_bytes"], 64 * 64 * texel, "{form}, {capture}");
+            let skips_normals = found.report.skipped.iter().any(|skipped| skipped.what == "normals");
+            assert_eq!(skips_normals, texel == 16, "{form}, {capture}");
+        }
     });
 }
 
@@ -153,22 +176,36 @@ fn maps_beyond_a_storage_buffers_range_are_refused() {
     });
 }
 
+/// Where a sphere of radius 0.3 touches a wall.
+const AT_WALL: DVec3 = DVec3::new(0.7, 0.0, 0.0);
+
+/// The room with a mirror sphere there.
+fn at_wall() -> Scene {
+    let mut scene = room_with(mirror(), AT_WALL, 0.3, EYE, 1.2, 1.0);
+    lamp(&mut scene, 1.0);
+    scene
+}
+
+/// The room with a mirror sphere half-way to a wall, behind a thin screen a hundredth from the room's middle.
+fn behind_a_thin_wall() -> Scene {
+    let mut scene = room_with(mirror(), B, 0.3, EYE, 1.2, 1.0);
+    lamp(&mut scene, 1.0);
+    let screen = scene.add_material(Material::lambert("screen", Vec3::splat(0.5)));
+    let at = |y: f32, z: f32| Vec3::new(0.01, y, z);
+    scene.place(quad(
+        "screen",
+        screen,
+        [at(-0.2, -0.2), at(0.2, -0.2), at(0.2, 0.2), at(-0.2, 0.2)],
+    ));
+    scene
+}
+
 /// Spheres at walls, walls in front of the map, maps outside of the room as far as may be, and an empty sky: pictures are finite, and rays to the sky are counted as such.
 #[test]
 fn hard_places_give_finite_pictures() {
     with_gpu(|gpu| {
         const SIZE: u32 = 16;
-        let mut at_wall = room_with(mirror(), DVec3::new(0.7, 0.0, 0.0), 0.3, EYE, 1.2, 1.0);
-        lamp(&mut at_wall, 1.0);
-        let mut thin = room_with(mirror(), B, 0.3, EYE, 1.2, 1.0);
-        lamp(&mut thin, 1.0);
-        let screen = thin.add_material(Material::lambert("screen", Vec3::splat(0.5)));
-        let at = |y: f32, z: f32| Vec3::new(0.01, y, z);
-        thin.place(quad(
-            "screen",
-            screen,
-            [at(-0.2, -0.2), at(0.2, -0.2), at(0.2, 0.2), at(-0.2, 0.2)],
-        ));
+        let (at_wall, thin) = (at_wall(), behind_a_thin_wall());
         let mut open = room_with(mirror(), DVec3::ZERO, 0.3, EYE, 1.2, 1.0);
         lamp(&mut open, 1.0);
         // Of the walls the floor alone is left.
@@ -195,6 +232,47 @@ fn hard_places_give_finite_pictures() {
             }
             let settings = json!({"place": place, "side": 64, "lights": 16});
             rendered(&renderer, "localized-gather", SIZE, 4, settings);
+        }
+    });
+}
+
+/// How hard places degrade beside the path tracer, as the documentation says: a sphere at a wall hardly does, one behind a thin wall before the map mirrors that wall in place of what the
+/// map's place does not see, and a second layer or the sphere's own middle as the place bring most of it back. Estimates by searches in f64, with texels of 256²: 0.005, 0.029, 1.51 and 0.25.
+#[test]
+fn hard_places_degrade_as_documented() {
+    with_gpu(|gpu| {
+        const SIZE: u32 = 24;
+        let middle = json!([0.0, 0.0, 0.0]);
+        let cases = [
+            (at_wall(), AT_WALL, vec![("at a wall", Value::Null, 1, (0.005, 0.01))]),
+            (
+                behind_a_thin_wall(),
+                B,
+                vec![
+                    ("behind a thin wall", Value::Null, 1, (0.03, 0.02)),
+                    ("thin wall before the map", middle.clone(), 1, (1.5, 0.15)),
+                    ("the same in two layers", middle, 2, (0.25, 0.1)),
+                ],
+            ),
+        ];
+        for (scene, centre, ways) in cases {
+            let on = pixels_of_sphere(&scene, SIZE, centre, 0.3, true);
+            assert!(on.len() > 200, "{}", on.len());
+            let renderer = renderer(gpu, &scene);
+            let of = |place: &Value, layers: u32| {
+                let steps = if layers > 1 { 8 } else { 3 };
+                let settings = json!({"place": place, "layers": layers, "steps": steps, "capture": "rays", "capture_samples": 1, "sampler": "pcg"});
+                rendered(&renderer, "impostor", SIZE, 256, settings)
+            };
+            let mut expected = None;
+            for (name, place, layers, (stated, margin)) in ways {
+                let found = of(&place, layers);
+                let expected = expected.get_or_insert_with(|| traced(&renderer, &found, SIZE, 1024));
+                let [off, bias] = errors_beyond_noise(&found, expected, &on);
+                println!("{name}: {off:.4}, documented {stated}, bias {bias:+.4}");
+                let gap: f64 = off - stated;
+                assert!(gap.abs() < margin, "{name}: {off}, not {stated}");
+            }
         }
     });
 }
@@ -306,43 +384,6 @@ fn glossy_surroundings_are_mirrored_as_the_maps_place_sees_them() {
                 "{radius}: {whole} {bias}"
             );
         }
-    });
-}
-
-/// Set in the processes that only print their pictures' hash.
-const CHILD: &str = "CLERESTORY_TEST_PRINT_IMPOSTOR_HASH";
-const CHILD_TEST: &str = "edge_cases::prints_its_hash_when_asked";
-
-/// On one thread of the driver and on two, and on vectors of 4, 8 and 16 lanes.
-#[test]
-fn bits_are_the_same_whoever_does_the_work() {
-    let hash = |threads, width| {
-        let variables = [("LP_NUM_THREADS", threads), ("LP_NATIVE_VECTOR_WIDTH", width)];
-        hash_in_child(CHILD_TEST, CHILD, &variables)
-    };
-    let truth = hash("1", "256");
-    assert_eq!(hash("2", "128"), truth);
-    assert_eq!(hash("2", "512"), truth);
-}
-
-#[test]
-fn prints_its_hash_when_asked() {
-    if std::env::var_os(CHILD).is_none() {
-        return;
-    }
-    with_gpu(|gpu| {
-        let mut scene = room_with(mirror(), B, 0.3, EYE, 1.5, 1.0);
-        lamp(&mut scene, 1.0);
-        let renderer = renderer(gpu, &scene);
-        let mut words = Vec::new();
-        for (technique, settings) in [
-            ("impostor", json!({"side": 64})),
-            ("localized-gather", json!({"side": 64, "lights": 16})),
-        ] {
-            let found = rendered(&renderer, technique, 16, 2, settings);
-            words.extend(layer(&found, "radiance").iter().map(|value| value.to_bits()));
-        }
-        print_hash(words);
     });
 }
 

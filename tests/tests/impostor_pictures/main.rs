@@ -2,6 +2,7 @@
 //!
 //! The room of most tests is that of the published figures, \[-1, 1\]³, with six walls of different colours and a point light; a sphere stands in it.
 
+mod bits;
 mod edge_cases;
 mod gathers;
 mod reflections;

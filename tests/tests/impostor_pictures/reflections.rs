@@ -305,19 +305,24 @@ fn maps_of_places_under_a_sun_are_drawn_with_its_shadows() {
 fn scale_changes_nothing() {
     with_gpu(|gpu| {
         const SIZE: u32 = 24;
-        let picture = |scale: f64| {
+        let picture = |scale: f64, technique: &str| {
             let mut scene = room_with(mirror(), B, RADIUS, EYE, 1.3, scale);
             lamp(&mut scene, scale as f32);
-            let settings = json!({"place": [0.0, 0.0, 0.0], "side": 256});
-            let found = rendered(&renderer(gpu, &scene), "impostor", SIZE, 16, settings);
+            let settings = match technique {
+                "impostor" => json!({"place": [0.0, 0.0, 0.0], "side": 256}),
+                _ => json!({"place": [0.0, 0.0, 0.0], "side": 128, "lights": 16}),
+            };
+            let found = rendered(&renderer(gpu, &scene), technique, SIZE, 16, settings);
             layer(&found, "radiance").to_vec()
         };
-        let metres = picture(1.0);
         let all: Vec<usize> = (0..(SIZE * SIZE) as usize).collect();
-        for scale in [1e5, 1e-4] {
-            let [off, bias] = errors(&picture(scale), &metres, &all);
-            println!("{scale:e}: {off:.5}, bias {bias:+.5}");
-            assert!(off < 0.01 && bias.abs() < 1e-3, "{scale}: {off} {bias}");
+        for technique in ["impostor", "localized-gather"] {
+            let metres = picture(1.0, technique);
+            for scale in [1e5, 1e-4] {
+                let [off, bias] = errors(&picture(scale, technique), &metres, &all);
+                println!("{technique}, {scale:e}: {off:.5}, bias {bias:+.5}");
+                assert!(off < 0.01 && bias.abs() < 1e-3, "{technique}, {scale}: {off} {bias}");
+            }
         }
     });
 }

@@ -238,7 +238,7 @@ fn thin_glass() -> Material {
 }
 
 /// The room with a lamp behind panes of thin glass across the view, at places along x.
-fn panes(at: &[f32]) -> Scene {
+pub(super) fn panes(at: &[f32]) -> Scene {
     panes_of(thin_glass(), at)
 }
 

@@ -1,21 +1,29 @@
 //! Same scene, settings, seed and driver: the same bits, however the work is cut up and whoever does it.
 
 use clerestory::gpu::Gpu;
+use clerestory::render::spectral::{SpectralMetal, render_spectral};
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Environment, Material, Mesh, Scene, SceneProfile};
+use clerestory::scene::metals::bins::Bins;
+use clerestory::scene::{
+    Camera, Distribution, Environment, FresnelForm, Geometry, LightKind, Material, Mesh, Microfacets, Scene,
+    SceneProfile, metals,
+};
 use clerestory::techniques::{self, PathTracerSettings};
 use clerestory::transport::random::SamplerKind;
-use clerestory_tests::child::hash_in_child;
+use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::random::Random;
-use clerestory_tests::render::{Rendered, builtin, finish, render, tracer};
+use clerestory_tests::render::{Rendered, builtin, finish, quad, render, tracer};
 use clerestory_tests::{gpu, with_gpu};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 const SIZE: [u32; 2] = [24, 16];
 const SAMPLES: u32 = 12;
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_HASH";
 const CHILD_TEST: &str = "determinism::prints_its_hash_when_asked";
+/// The same of pictures of metals.
+const CHILD_OF_METALS: &str = "CLERESTORY_TEST_PRINT_HASH_OF_METALS";
+const CHILD_TEST_OF_METALS: &str = "determinism::prints_its_hash_of_metals_when_asked";
 
 fn scene() -> Scene {
     builtin("builtin:cornell-box")
@@ -180,4 +188,90 @@ fn prints_its_hash_when_asked() {
     };
     println!("hash {:016x}", picture(&gpu, &settings).hash());
     clerestory_tests::assert_no_messages(&gpu);
+}
+
+/// Plates of rough gold side by side under a sky and a lamp: one for each form of its factor, and two of classical microfacets.
+fn plates() -> (Scene, Vec<SpectralMetal>) {
+    const WIDTH: f32 = 0.7;
+    let gold = metals::spectrum("gold").unwrap();
+    let classical = [
+        (Distribution::Beckmann, Geometry::CookTorrance),
+        (Distribution::CosineLobe, Geometry::Simplified),
+    ]
+    .map(|(distribution, geometry)| Some(Microfacets { distribution, geometry }));
+    let kinds = FresnelForm::ALL
+        .map(|form| (form, None))
+        .into_iter()
+        .chain(classical.map(|microfacets| (FresnelForm::Exact, microfacets)));
+    let mut scene = Scene::default();
+    let mut spectral = Vec::new();
+    for (place, (fresnel, classic_microfacets)) in (0u8..).zip(kinds) {
+        let material = scene.add_material(Material {
+            roughness: 0.4,
+            conductor: Some(gold.channels()),
+            fresnel,
+            classic_microfacets,
+            ..Material::mirror("gold", Vec3::ONE)
+        });
+        let at = |x: f32, z: f32| Vec3::new(WIDTH * (f32::from(place) + x - 4.5), 0.0, z);
+        scene.place(quad(
+            "plate",
+            material,
+            [at(0.0, -1.0), at(0.0, 1.0), at(1.0, 1.0), at(1.0, -1.0)],
+        ));
+        spectral.push(SpectralMetal {
+            material,
+            spectrum: gold.clone(),
+        });
+    }
+    scene.environment = Some(Environment::uniform(Vec3::ONE));
+    scene.add_light(
+        "lamp",
+        LightKind::Point {
+            position: Vec3::new(0.0, 1.5, -0.5),
+            intensity: Vec3::splat(3.0),
+        },
+    );
+    scene.cameras.push(Camera::look_at(
+        "main",
+        DVec3::new(0.0, 5.0, 6.0),
+        DVec3::ZERO,
+        DVec3::Y,
+        0.6,
+    ));
+    (scene, spectral)
+}
+
+/// Every form of the factor, classical microfacets, and bins of wavelengths.
+#[test]
+fn threads_of_the_driver_never_show_on_metals() {
+    let hash = |threads| hash_in_child(CHILD_TEST_OF_METALS, CHILD_OF_METALS, &[("LP_NUM_THREADS", threads)]);
+    assert_eq!(hash("2"), hash("1"));
+}
+
+#[test]
+fn prints_its_hash_of_metals_when_asked() {
+    if std::env::var_os(CHILD_OF_METALS).is_none() {
+        return;
+    }
+    with_gpu(|gpu| {
+        let (scene, spectral) = plates();
+        let options = RenderOptions {
+            size: SIZE,
+            spp: 2,
+            seed: 3,
+            ..RenderOptions::default()
+        };
+        let channels = Renderer::new(gpu, &scene)
+            .and_then(|renderer| renderer.render(&options))
+            .unwrap();
+        let bins = render_spectral(gpu, &scene, &spectral, &Bins::new(8).unwrap(), &options).unwrap();
+        let bits = [&channels.picture, &bins.picture].map(|picture| -> Vec<u32> {
+            let values = picture.require("radiance").unwrap().values();
+            assert!(values.iter().any(|value| *value > 0.1));
+            values.iter().map(|value| value.to_bits()).collect()
+        });
+        assert!(bits[0] != bits[1]);
+        print_hash(bits.concat());
+    });
 }

@@ -84,6 +84,13 @@ fn frames(gpu: &Gpu, refresh: Refresh, count: u64, place: impl Fn(u64) -> Vec3) 
     (0..count).map(frame).collect()
 }
 
+/// Values of frames over a map's refresh and its fade.
+pub fn faded_values(gpu: &Gpu) -> Vec<f32> {
+    let place = |frame: u64| Vec3::new(if frame < 2 { -0.5 } else { 0.5 }, 0.1, 0.0);
+    let shown = frames(gpu, Refresh { period: 2, fade: 2 }, 4, place);
+    shown.into_iter().flat_map(|frame| frame.values).collect()
+}
+
 /// The greatest difference of two pictures' values.
 fn difference(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)

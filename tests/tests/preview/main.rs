@@ -1,5 +1,6 @@
 //! Raster preview: shadow maps against shadow rays, light probes against closed forms and rays, moved objects.
 
+mod bits;
 mod fading;
 mod light;
 mod live;

@@ -132,6 +132,11 @@ fn drawn(gpu: &Gpu, scene: &Scene, samples: u32) -> Vec<f32> {
     mirror.picture().unwrap().main_layer().unwrap().values().to_vec()
 }
 
+/// Values of a mirror's picture.
+pub fn mirrored_values(gpu: &Gpu) -> Vec<f32> {
+    drawn(gpu, &room(Projection::Perspective { fov_y: 0.5 }), 1)
+}
+
 /// To 1/255 in all pixels that have no edge in them: by the path tracer's own variance, at most a twentieth of that.
 #[test]
 fn a_planar_mirror_is_the_path_tracers() {

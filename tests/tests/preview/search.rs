@@ -113,6 +113,11 @@ impl Stage {
     }
 }
 
+/// Values of a picture of searched reflections.
+pub fn searched_values(gpu: &Gpu) -> Vec<f32> {
+    Stage::new(gpu).drawn(gpu, Some(&ImpostorSettings::default())).picture
+}
+
 /// Where the mirrored ray of a pixel's middle meets the room, from the map's place, and which face that is; `None` where it passes by the sphere or close to its rim.
 fn exact(pixel: u32) -> Option<(DVec3, usize)> {
     let half = f64::from(0.5 * FOV).tan();

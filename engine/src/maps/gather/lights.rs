@@ -122,6 +122,28 @@ fn disc(t: f64) -> f64 {
     }
 }
 
+/// The few greatest terms and their radiance, greatest first; of equal ones the first: twin of `maps/gather_few.glsl`.
+#[derive(Default)]
+struct GatherFew([(f64, DVec3); GATHER_FEW as usize]);
+
+impl GatherFew {
+    /// Adds a term, and leaves the least out.
+    fn add(&mut self, term: f64, radiance: DVec3) {
+        let mut entry = (term, radiance);
+        for kept in &mut self.0 {
+            if entry.0 > kept.0 {
+                std::mem::swap(&mut entry, kept);
+            }
+        }
+    }
+
+    /// Terms times radiance, and terms, in all.
+    fn sum(&self) -> (DVec3, f64) {
+        let sum = self.0.iter().map(|(term, radiance)| *term * *radiance).sum();
+        (sum, self.0.iter().map(|(term, _)| term).sum())
+    }
+}
+
 impl GatherLights {
     /// Lights of `side`² texels of each layer, from radiance and distances of the same map, whose own texels are a multiple of it.
     ///
@@ -241,18 +263,11 @@ impl GatherLights {
             let block = |lights: &[GatherLight]| lights.iter().map(|light| term(light) * light.radiance).sum::<DVec3>();
             return blocks.map(block).sum();
         }
-        // Greatest first; of equal ones the first.
-        let mut best = [(0.0, DVec3::ZERO); GATHER_FEW as usize];
+        let mut few = GatherFew::default();
         for light in &self.lights {
-            let mut entry = (term(light), light.radiance);
-            for kept in &mut best {
-                if entry.0 > kept.0 {
-                    std::mem::swap(&mut entry, kept);
-                }
-            }
+            few.add(term(light), light.radiance);
         }
-        let whole: f64 = best.iter().map(|(weight, _)| weight).sum();
-        let sum: DVec3 = best.iter().map(|(weight, radiance)| *weight * *radiance).sum();
+        let (sum, whole) = few.sum();
         match terms {
             Terms::Five if whole > 0.0 => sum / whole,
             _ => sum,

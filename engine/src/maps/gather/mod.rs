@@ -146,15 +146,19 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::PartOf("MET-G3"),
         limits: "Of use where five texels hold most of the lobe, not of finer maps.",
         sources: &[sources::SZIRMAY_KALOS_LAZANYI_2006.whole()],
-        shaders: &["shaders/maps/gather.glsl"],
+        shaders: &["shaders/maps/gather_few.glsl"],
         bias: Some(Bias::Biased(
             "the light of all texels but five is taken to be as theirs",
         )),
         tests: &[
             "engine/src/maps/gather/tests/errors.rs::five_terms_keep_the_energy",
             "tests/tests/maps/gathers.rs::gathers_are_their_twins",
+            "tests/tests/impostor_pictures/gathers.rs::five_terms_keep_the_light_of_a_rough_metal",
         ],
-        settings: &["clerestory::maps::gather::Terms"],
+        settings: &[
+            "clerestory::maps::gather::Terms",
+            "clerestory::techniques::localized_gather::GatherTerms",
+        ],
         ..Row::of(file!())
     },
 ];

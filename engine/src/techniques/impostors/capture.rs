@@ -131,8 +131,10 @@ pub(in crate::techniques) struct CapturePlan {
     pub by: CaptureBy,
     /// Scatterings of the light in it, least and most.
     pub bounces: [u32; 2],
-    /// Whether distances and normals are wanted.
+    /// Whether distances are wanted.
     pub with_distances: bool,
+    /// Whether normals are wanted beside them.
+    pub with_normals: bool,
     /// Layers of surfaces; 1 without distances, and of a drawn map.
     pub layers: u32,
     /// Triangles that are left out, in their order.
@@ -158,7 +160,7 @@ pub(in crate::techniques) struct Captured {
     pub side: u32,
     /// Radiance, three f32 a texel, row by row, layer of surfaces by layer; visible to compute shaders.
     pub radiance: Buffer,
-    /// Distances and normals, where they were wanted.
+    /// Distances, where they were wanted, with normals where those were.
     pub impostor: Option<ImpostorImage>,
 }
 
@@ -171,6 +173,15 @@ impl Captured {
         let size = UVec2::splat(self.side);
         let texels: Vec<[f32; 3]> = gpu.read(self.radiance.view(), size.element_product() as usize)?;
         MapImage::new(MAP, size, texels.into_iter().map(Vec3::from_array).collect())
+    }
+
+    /// Bytes of radiance, distances and normals.
+    pub fn bytes(&self) -> u64 {
+        let of_image = |image: &ImpostorImage| {
+            let normals = image.normals().unwrap_or_default();
+            (size_of_val(image.distances()) + size_of_val(normals)) as u64
+        };
+        self.radiance.bytes() + self.impostor.as_ref().map_or(0, of_image)
     }
 }
 
@@ -334,11 +345,12 @@ impl Capture {
             return Ok(None);
         }
         let distances: Vec<f32> = gbuffer.read(gpu, Output::Distance)?;
-        let words: Vec<[u32; 2]> = gbuffer.read(gpu, Output::Normals)?;
-        let normals: Vec<DVec3> = words
-            .iter()
-            .map(|[geometric, _]| unpack_octahedral(*geometric, PACKED_NORMAL_BITS))
-            .collect();
+        let normals = || -> Result<Vec<DVec3>> {
+            let words: Vec<[u32; 2]> = gbuffer.read(gpu, Output::Normals)?;
+            let unpack = |[geometric, _]: &[u32; 2]| unpack_octahedral(*geometric, PACKED_NORMAL_BITS);
+            Ok(words.iter().map(unpack).collect())
+        };
+        let normals = self.plan.with_normals.then(normals).transpose()?;
         let nothing = ImpostorImage::NOTHING;
         let distances = distances.into_iter().map(|distance| distance.min(nothing)).collect();
         let triangles = match self.plan.layers {

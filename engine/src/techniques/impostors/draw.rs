@@ -61,7 +61,10 @@ impl MapDrawing {
         }
         // Paths begin by distances, whoever else wants them.
         if plan.with_distances || !is_shaded {
-            outputs.extend([Output::Distance, Output::Normals]);
+            outputs.push(Output::Distance);
+        }
+        if plan.with_normals {
+            outputs.push(Output::Normals);
         }
         if plan.layers > 1 {
             outputs.push(Output::Triangle);

@@ -37,6 +37,7 @@ pub(super) struct Layers {
     place: Vec3,
     side: u32,
     left_out: Vec<Range<u32>>,
+    with_normals: bool,
     /// Distances and normals of each, row by row; the last one may lack its end.
     layers: Vec<Layer>,
     /// Triangles of the first, where further ones are wanted.
@@ -50,6 +51,7 @@ pub(super) struct Layers {
 #[derive(Default)]
 struct Layer {
     distances: Vec<f32>,
+    /// Where they are wanted.
     normals: Vec<DVec3>,
     /// Of surfaces, once further layers are looked for.
     sides: Vec<Side>,
@@ -97,15 +99,16 @@ impl Tracing {
 }
 
 impl Layers {
-    /// The first layer, as it was drawn; its triangles where further ones are wanted.
-    pub fn new(plan: &CapturePlan, distances: Vec<f32>, normals: Vec<DVec3>, triangles: Vec<u32>) -> Self {
+    /// The first layer, as it was drawn; with its normals where they are wanted, and its triangles where further layers are.
+    pub fn new(plan: &CapturePlan, distances: Vec<f32>, normals: Option<Vec<DVec3>>, triangles: Vec<u32>) -> Self {
         Self {
             place: plan.place,
             side: plan.side,
             left_out: plan.left_out.clone(),
+            with_normals: normals.is_some(),
             layers: vec![Layer {
                 distances,
-                normals,
+                normals: normals.unwrap_or_default(),
                 sides: Vec::new(),
             }],
             drawn: triangles,
@@ -172,7 +175,9 @@ impl Layers {
         };
         for texel in part.clone() {
             next.distances.push(ImpostorImage::NOTHING);
-            next.normals.push(-direction(side, texel));
+            if self.with_normals {
+                next.normals.push(-direction(side, texel));
+            }
             next.sides.push(NO_SIDE);
         }
         let mut waiting: Vec<(usize, Ray)> = part
@@ -195,7 +200,11 @@ impl Layers {
                     continue;
                 }
                 next.distances[texel] = hit.t.clamp(last.distances[texel], ImpostorImage::NOTHING);
-                (next.sides[texel], next.normals[texel]) = tracing.side(hit.triangle, direction(side, texel));
+                let (met, normal) = tracing.side(hit.triangle, direction(side, texel));
+                next.sides[texel] = met;
+                if let Some(kept) = next.normals.get_mut(texel) {
+                    *kept = normal;
+                }
             }
             waiting = left;
             if waiting.is_empty() {
@@ -256,7 +265,8 @@ impl Layers {
             .flat_map(|layer| layer.normals.iter().copied())
             .collect();
         let count = self.layers.len() as u32;
-        ImpostorImage::new(MAP, UVec2::splat(self.side), count, distances, Some(&normals))
+        let normals = self.with_normals.then_some(normals.as_slice());
+        ImpostorImage::new(MAP, UVec2::splat(self.side), count, distances, normals)
     }
 }
 
@@ -296,6 +306,7 @@ mod tests {
             place: Vec3::ZERO,
             side: 1,
             left_out: Vec::new(),
+            with_normals: true,
             layers: vec![
                 layer(
                     [1.0, 2.0, nothing, 2.0],

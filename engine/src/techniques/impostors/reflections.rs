@@ -179,6 +179,8 @@ impl ImpostorReflections {
             by,
             bounces: [0, settings.bounces],
             with_distances: settings.search().is_some(),
+            // A texel's distance is that to the plane through its point.
+            with_normals: settings.search().is_some(),
             layers: settings.layers,
             left_out,
             shadow_side: settings.shadow_side,

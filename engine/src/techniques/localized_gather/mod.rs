@@ -5,7 +5,8 @@
 //!
 //! Eye paths are the path tracer's: what is seen, and direct light where they first arrive, `LE|L.E`. Where that is at a rough surface, light that was scattered once in the map, or
 //! as often as the setting says, is gathered: `L.[DG]E`. Light that no surface has scattered is not in the map, whatever it comes from, so that emission comes by light sampling alone and never twice.
-//! The sums go over all lights, for what is reflected evenly about the normal and, by a narrower lobe, about the mirrored direction.
+//! The sums go over all lights, for what is reflected evenly about the normal and, by a narrower lobe, about the mirrored direction; for the latter over the five greatest
+//! terms alone where the setting [`terms`](LocalizedGatherSettings::terms) says so.
 //!
 //! The map is captured once, before the first sample, and holds for all cameras.
 //!
@@ -15,6 +16,7 @@
 //! - What the map's place does not see lights nothing, and radiance is that towards the map's place.
 //! - Each texel is one disc of even radiance: with normals the error falls with more of them, without it stays.
 //! - Microfacets reflect by a power of the cosine about the mirrored direction, of an exponent of 64 at most; their albedo is that of even surroundings.
+//! - Five terms stand for all of the lobe about the mirrored direction, where they are asked for.
 //! - The lobe about the mirrored direction ends at the surface's horizon, and is scaled to the whole there: at grazing views, where a half of it is below, its mean direction is higher.
 //! - Rough conductors reflect by Schlick's factor.
 //! - The map is the capture's, with its shadows and its noise, which is the same for all seeds.
@@ -28,4 +30,4 @@ mod stage;
 
 pub(super) use card::CARD;
 pub use renderer::LocalizedGather;
-pub use settings::{GatherForm, LocalizedGatherSettings};
+pub use settings::{GatherForm, GatherTerms, LocalizedGatherSettings};

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::card::refusals;
-use super::settings::LocalizedGatherSettings;
+use super::settings::{GatherForm, LocalizedGatherSettings};
 use super::stage::{Gather, LocalizedStage};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
@@ -41,6 +41,7 @@ struct Gathering {
     triangles: Range<u32>,
     gather: Option<Gather>,
     gathers: u64,
+    map_bytes: u64,
 }
 
 impl MapUse for Gathering {
@@ -49,12 +50,13 @@ impl MapUse for Gathering {
             return Ok(());
         };
         let settings = &self.settings;
+        self.map_bytes = captured.bytes();
         let lights = GatherLights::new(&captured.read(gpu)?, impostor, settings.lights, settings.form.form())?;
         self.gather = Some(Gather::new(
             gpu,
             scene,
             &lights,
-            settings.cones,
+            settings,
             self.place,
             self.triangles.clone(),
         )?);
@@ -75,7 +77,11 @@ impl MapUse for Gathering {
 
     fn counters(&self) -> BTreeMap<&'static str, u64> {
         let lights = self.gather.as_ref().map_or(0, Gather::lights);
-        BTreeMap::from([("gathers", self.gathers), ("lights", lights.into())])
+        BTreeMap::from([
+            ("gathers", self.gathers),
+            ("lights", lights.into()),
+            ("map_bytes", self.map_bytes),
+        ])
     }
 
     fn pipelines(&self) -> Vec<PipelineInfo> {
@@ -134,6 +140,7 @@ impl LocalizedGather {
             // What emits is found by eye paths alone.
             bounces: [1, settings.bounces],
             with_distances: true,
+            with_normals: settings.form == GatherForm::DiscWithNormals,
             layers: 1,
             left_out,
             shadow_side: settings.shadow_side,
@@ -151,6 +158,7 @@ impl LocalizedGather {
             triangles,
             gather: None,
             gathers: 0,
+            map_bytes: 0,
         };
         Ok(Self {
             settings,
@@ -219,10 +227,17 @@ impl LocalizedGather {
 
     /// What was left out, and why.
     pub fn skipped(&self) -> Vec<Skipped> {
-        self.renderer.skipped(Skipped {
+        let mut all = self.renderer.skipped(Skipped {
             what: "map and gather",
             why: "nothing is lit",
-        })
+        });
+        if self.settings.form != GatherForm::DiscWithNormals {
+            all.push(Skipped {
+                what: "normals",
+                why: "the form of solid angles takes none",
+            });
+        }
+        all
     }
 }
 

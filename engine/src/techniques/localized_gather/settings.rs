@@ -30,6 +30,17 @@ impl GatherForm {
     }
 }
 
+/// Which lights the lobe takes that stands for microfacets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GatherTerms {
+    /// All.
+    #[default]
+    All,
+    /// The five of the greatest reflectivity times solid angle, scaled to the lobe's whole: as published for glossy surfaces.
+    Five,
+}
+
 crate::settings! {
     /// Settings of [`LocalizedGather`](super::LocalizedGather).
     pub struct LocalizedGatherSettings {
@@ -49,6 +60,10 @@ crate::settings! {
         pub form: GatherForm = GatherForm::DiscWithNormals;
         /// Takes the mean of a cosine lobe over a light's cone instead of the lobe at its middle: no bright spots near walls.
         pub cones: bool = true;
+        /// Which lights the lobe takes that stands for microfacets; changes the picture. What is reflected evenly about the normal takes all.
+        ///
+        /// Five are of use where they hold most of the lobe: 8² lights for exponents about 10. All terms are evaluated to find them.
+        pub terms: GatherTerms = GatherTerms::All;
         /// How radiance comes into the map: rasterized, by rays, or by rays where rasterization lacks light of the scene.
         pub capture: CaptureBy = CaptureBy::Auto;
         /// Along a side of the map's octahedron, whose texels the lights are means of.

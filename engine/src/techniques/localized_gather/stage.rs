@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
+use super::settings::{GatherTerms, LocalizedGatherSettings};
 use crate::Result;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::sets::WaveSet;
@@ -33,7 +34,7 @@ impl Gather {
         gpu: &Gpu,
         scene: &GpuScene,
         lights: &GatherLights,
-        cones: bool,
+        settings: &LocalizedGatherSettings,
         place: Vec3,
         triangles: Range<u32>,
     ) -> Result<Self> {
@@ -41,7 +42,8 @@ impl Gather {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
             separable_masking: false,
             gather_form: lights.form().number(),
-            gather_cones: cones,
+            gather_five: settings.terms == GatherTerms::Five,
+            gather_cones: settings.cones,
             ..Default::default()
         });
         let has_normals = lights.form() == SolidAngleForm::DiscWithNormals;
@@ -55,7 +57,7 @@ impl Gather {
             pipeline: gpu.compute_pipeline(&spec)?,
             count: records.len() as u32,
             lights: gpu.buffer_with("localized gather: lights", Category::Light, &records)?,
-            table: cones.then(table).transpose()?,
+            table: settings.cones.then(table).transpose()?,
             place,
             triangles,
             counters: gpu.buffer(&BufferDesc::storage("localized gather counters", bytes, Category::Work))?,

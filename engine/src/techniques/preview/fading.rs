@@ -197,6 +197,7 @@ pub(super) const ROWS: &[Row] = &[Row {
         "tests/tests/preview/fading.rs::a_scene_at_rest_shows_no_change",
         "tests/tests/preview/fading.rs::pictures_go_over_in_even_steps",
         "tests/tests/preview/fading.rs::refreshes_that_cannot_be_are_refused",
+        "tests/tests/preview/bits.rs::threads_of_the_driver_never_show",
         "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
         "engine/src/maps/impostor/tests/searches.rs::a_fresh_map_leaves_parallax",
     ],
