@@ -238,6 +238,8 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/bounces.rs::tiles_have_all_bounces_over_as_many_frames",
             "tests/tests/instant_radiosity/many_light/tiles.rs::twice_the_lights_are_as_bright",
             "tests/tests/instant_radiosity/many_light/truths.rs::a_virtual_light_lights_a_plane_as_its_law_says",
+            "tests/tests/instant_radiosity/many_light/truths.rs::all_of_a_lights_power_arrives_on_the_plane",
+            "tests/tests/instant_radiosity/many_light/truths.rs::squares_have_their_form_factors_behind_a_blocker",
             "tests/tests/instant_radiosity/many_light/truths.rs::walls_that_emit_bring_their_own_radiosity",
             "tests/tests/instant_radiosity/many_light/truths.rs::errors_fall_with_the_root_of_the_lights",
             "tests/tests/instant_radiosity/many_light/bounces.rs::further_bounces_do_not_depend_on_how_work_is_shared_out",
@@ -264,6 +266,7 @@ const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers",
             "tests/tests/instant_radiosity/many_light/truths.rs::points_light_a_plane_as_their_law_says",
+            "tests/tests/instant_radiosity/many_light/truths.rs::all_of_a_lights_power_arrives_on_the_plane",
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers_through_any_camera",
         ],
         settings: &["path_set"],
@@ -310,6 +313,7 @@ const ROWS: &[Row] = &[
         )),
         tests: &[
             "tests/tests/instant_radiosity/many_light/tiles.rs::filters_average_what_lies_in_one_plane_alone",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::filters_leave_constants_as_they_are_to_the_bit",
             "tests/tests/instant_radiosity/many_light/tiles.rs::filters_divide_by_all_that_a_surface_scatters",
             "tests/tests/instant_radiosity/many_light/tiles.rs::filtered_tiles_are_nearly_what_all_lights_bring",
             "tests/tests/instant_radiosity/many_light/truths.rs::filters_leave_a_sixteenth_of_the_noise",
@@ -525,6 +529,7 @@ const ROWS: &[Row] = &[
         needs: &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"],
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays",
+            "tests/tests/instant_radiosity/many_light/truths.rs::squares_have_their_form_factors_behind_a_blocker",
             "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",
         ],
         settings: &["map_side"],
