@@ -174,6 +174,7 @@ measures! {
     on_device "ray-engine" rays::ray_engine;
     on_host "ray-offsets" rays::ray_offsets;
     on_device "reflection-maps" preview::reflection_maps;
+    on_device "rsm-discs" virtual_lights::rsm_discs;
     on_host "sample-sums" rendering::sample_sums;
     on_device "scene-profile" rendering::scene_profile;
     on_device "shadow-maps" preview::shadow_maps.of_any_scenes();

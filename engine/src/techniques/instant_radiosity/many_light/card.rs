@@ -348,6 +348,7 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/reflective.rs::black_maps_give_no_lights",
             "tests/tests/instant_radiosity/many_light/reflective.rs::reflective_maps_are_drawn_for_no_others_and_shared_out_alike",
         ],
+        api: &["clerestory::techniques::instant_radiosity::many_light::ReflectiveMap"],
         settings: &["placement", "rsm_side", "rsm_sequence", "emitters"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/reflective.rs")
     },
@@ -366,6 +367,9 @@ const ROWS: &[Row] = &[
         )),
         needs: NEEDS,
         tests: &[
+            "tests/tests/instant_radiosity/many_light/discs.rs::a_virtual_light_on_each_texel_brings_the_sum_of_all_texels",
+            "tests/tests/instant_radiosity/many_light/discs.rs::discs_have_the_sum_of_their_texels_as_their_mean",
+            "tests/tests/instant_radiosity/many_light/discs.rs::light_through_everything_exceeds_that_of_rays_by_what_is_hidden",
             "tests/tests/instant_radiosity/many_light/discs.rs::discs_over_all_texels_bring_what_all_lights_do",
             "tests/tests/instant_radiosity/many_light/discs.rs::discs_need_reflective_maps_and_no_lights",
             "engine/src/raster/reflective.rs::discs_are_weighted_by_the_inverse_of_their_density",

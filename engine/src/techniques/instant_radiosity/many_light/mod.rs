@@ -57,11 +57,13 @@ mod metropolis;
 mod past;
 mod records;
 mod reflective;
+mod reflective_map;
 mod renderer;
 mod reservoirs;
 mod settings;
 
 pub(in crate::techniques) use card::CARD;
 pub use interleave::Interleaving;
+pub use reflective_map::{PixelLight, ReflectiveMap};
 pub use renderer::{ManyLight, ManyLightCounts};
 pub use settings::{Gathering, ManyLightSettings, Placement, RsmSequence, Visibility};

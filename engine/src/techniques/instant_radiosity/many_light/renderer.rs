@@ -84,6 +84,8 @@ pub struct ManyLight {
     pub(super) before: u32,
     /// Virtual lights that a frame has placed last.
     pub(super) placed: u32,
+    /// Views of lights that a frame has drawn last.
+    pub(super) viewed: u32,
     pub(super) counts: ManyLightCounts,
 }
 
@@ -218,6 +220,7 @@ impl ManyLight {
             done: 0,
             before: 0,
             placed: 0,
+            viewed: 0,
             counts: ManyLightCounts::default(),
             scene,
         })

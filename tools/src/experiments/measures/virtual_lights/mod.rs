@@ -1,7 +1,8 @@
 //! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, and orders in which points take them; on the device those that are kept from frame to frame,
-//! and light that is.
+//! light that is, and what discs of reflective shadow maps have of it.
 
 pub mod deferred_stages;
+pub mod rsm_discs;
 mod unit_box;
 pub mod vpl_history;
 pub mod vpl_incremental;
