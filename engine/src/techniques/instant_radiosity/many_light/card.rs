@@ -212,7 +212,7 @@ const DISPLAYED: &str = "bounces=0..2,lobes=diffuse+glossy+reflection+transmissi
 const ROWS: &[Row] = &[
     Row {
         id: "SVO-P12",
-        name: "technique `many-light`: deferred frames of direct light and of one reflection more, or several, by virtual lights, new for each frame or kept",
+        name: "technique `many-light`: deferred frames, on a G-buffer (SVO-P6), of direct light and of one reflection more, or several, by virtual lights, new for each frame or kept",
         role: Role::Technique,
         limits: "Paths by lobes other than mirrors; one indirect bounce of reflective shadow maps and of kept lights, any number of walks and of chains, of which a tile has had all parts after as many frames as there are tiles; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated.",
         sources: &[
@@ -243,6 +243,7 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/truths.rs::walls_that_emit_bring_their_own_radiosity",
             "tests/tests/instant_radiosity/many_light/truths.rs::errors_fall_with_the_root_of_the_lights",
             "tests/tests/instant_radiosity/many_light/bounces.rs::further_bounces_do_not_depend_on_how_work_is_shared_out",
+            "tests/tests/raster/gbuffer.rs::positions_project_to_the_middles_of_their_pixels",
             "tests/tests/instant_radiosity/many_light.rs::frames_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/instant_radiosity/many_light.rs::what_is_not_needed_is_not_recorded",
             "tests/tests/instant_radiosity/many_light.rs::scenes_without_lights_are_black_and_walks_that_leave_do_no_harm",
