@@ -214,7 +214,7 @@ const ROWS: &[Row] = &[
         id: "SVO-P12",
         name: "technique `many-light`: deferred frames, on a G-buffer (SVO-P6), of direct light and of one reflection more, or several, by virtual lights, new for each frame or kept",
         role: Role::Technique,
-        limits: "Paths by lobes other than mirrors; one indirect bounce of reflective shadow maps and of kept lights, any number of walks and of chains, of which a tile has had all parts after as many frames as there are tiles; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated.",
+        limits: "Paths by lobes other than mirrors; one indirect bounce of reflective shadow maps and of kept lights, any number of walks and of chains, of which a tile has had all parts after as many frames as there are tiles; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated; frames wait for the device, as the count of lights is read back between walks and gather, so that they have steps of their own and cannot be recorded into a host's command buffer.",
         sources: &[
             sources::KELLER_1997.whole(),
             sources::SAITO_TAKAHASHI_1990.whole(),

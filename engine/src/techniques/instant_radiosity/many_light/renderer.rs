@@ -62,6 +62,9 @@ pub struct ManyLightCounts {
 }
 
 /// A rendering of one view by frames of many lights.
+///
+/// It goes on by [`step`](Self::step), each of which waits for the device: the count of virtual lights is read back between walks and gather. So it is no
+/// [`FrameMethod`](crate::techniques::FrameMethod), and cannot be recorded into a command buffer of a host.
 pub struct ManyLight {
     pub(super) gpu: Gpu,
     pub(super) scene: Arc<GpuScene>,
