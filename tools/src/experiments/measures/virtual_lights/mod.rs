@@ -1,4 +1,4 @@
-//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, and orders in which points take them; on the device those that are kept from frame to frame,
+//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, their spikes, and orders in which points take them; on the device those that are kept from frame to frame,
 //! light that is, and what discs of reflective shadow maps have of it.
 
 pub mod deferred_stages;
@@ -8,4 +8,5 @@ pub mod vpl_history;
 pub mod vpl_incremental;
 pub mod vpl_order;
 pub mod vpl_potential;
+pub mod vpl_spikes;
 pub mod vpl_walks;
