@@ -412,14 +412,22 @@ fn the_keys_of_many_lights_change_its_frames() {
         light(&all)
     );
     // Without visibility light goes through the boxes.
-    let (through, _) = shown("vvpp");
+    let (through, _) = shown("vpp");
     assert!(
         light(&through) > 1.02 * light(&indirect),
         "{} {}",
         light(&through),
         light(&indirect)
     );
-    let (_, text) = shown("vvppb+fh");
+    for (keys, expected) in [
+        ("vv", "visibility Imperfect"),
+        ("vvv", "visibility Maps"),
+        ("vvvv", "visibility Rays"),
+    ] {
+        let (_, text) = shown(keys);
+        assert!(text.contains(expected), "no {expected:?} in {text}");
+    }
+    let (_, text) = shown("vppb+fh");
     for expected in [
         "128 lights",
         "visibility None",
@@ -431,6 +439,35 @@ fn the_keys_of_many_lights_change_its_frames() {
         assert!(text.contains(expected), "no {expected:?} in {text}");
     }
     assert!(shown("-").1.contains("32 lights"));
+}
+
+#[test]
+fn the_buffers_of_many_lights_are_shown_one_by_one() {
+    let shown = |keys: &str, expected: &str| {
+        let (picture, text) = many_lights(&["--turn", "0", "--frames", "4", "--keys", keys]);
+        assert!(text.contains(&format!("{expected}: ")), "no {expected:?} in {text}");
+        picture
+    };
+    let all = [0.0, 1.0];
+    // The box has its x axis to the left, which is red; normals of the floor are green.
+    let places = shown("g", "places");
+    let [left, right] = [[0.0, 0.3], [0.7, 1.0]].map(|across| mean(&places, across, all)[0]);
+    assert!(left > 1.5 * right, "{left} {right}");
+    let normals = shown("gg", "normals");
+    let [ceiling, floor] = [[0.04, 0.15], [0.85, 0.96]].map(|down| mean(&normals, [0.4, 0.6], down)[1]);
+    assert!(floor > 2.0 * ceiling, "{ceiling} {floor}");
+    let direct = shown("ggg", "direct light");
+    let merged = shown("gggg", "indirect light before the filter");
+    let filtered = shown("ggggg", "indirect light behind the filter");
+    let [direct, of_merged, of_filtered] = [&direct, &merged, &filtered].map(|picture| mean(picture, all, all)[0]);
+    assert!(
+        direct > 0.0 && (of_filtered / of_merged - 1.0).abs() < 0.3,
+        "{of_merged} {of_filtered}"
+    );
+    assert!(merged != filtered, "nothing is filtered");
+    shown("gggggg", "all light");
+    // From a buffer to the next part of the light.
+    shown("ggp", "light of lamps");
 }
 
 /// The last frame of the photon viewer, and what it said.

@@ -243,7 +243,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_chi_square::{chi_square, chi_square_z};
     use crate::test_random::Random;
+
+    /// The standard normal variable that one in a hundred is above.
+    const ONE_IN_A_HUNDRED: f64 = 2.326;
 
     /// The sum over a face of a cube in so many texels.
     fn face(side: u32, extent: impl Fn(DVec2, DVec2) -> f64) -> f64 {
@@ -304,29 +308,19 @@ mod tests {
         let levels = flux_levels(&map, side);
         let total: f64 = map.iter().sum();
         assert!((levels[3][0] / total - 1.0).abs() < 1e-12 && levels.len() == 4);
-        let count = 200_000;
-        let mut found = vec![0u32; side * side];
+        let count = 1_000_000;
+        let mut found = vec![0.0; side * side];
         for _ in 0..count {
             let point = DVec2::new(random.unit().into(), random.unit().into());
             let (texel, probability) = warp_through(&levels, point).expect("a texel");
             assert!((probability - map[texel] / total).abs() < 1e-12);
-            found[texel] += 1;
+            found[texel] += 1.0;
         }
-        let expected = map.iter().map(|flux| flux / total * f64::from(count));
-        let (mut chi_square, mut degrees) = (0.0, -1.0);
-        for (found, expected) in found.iter().zip(expected) {
-            if expected > 0.0 {
-                chi_square += (f64::from(*found) - expected).powi(2) / expected;
-                degrees += 1.0;
-            } else {
-                assert_eq!(*found, 0);
-            }
-        }
-        // Four deviations of the chi-square distribution: one run in 10,000.
-        assert!(
-            chi_square < degrees + 4.0 * f64::sqrt(2.0 * degrees),
-            "{chi_square} {degrees}"
-        );
+        let expected: Vec<f64> = map.iter().map(|flux| flux / total * f64::from(count)).collect();
+        // Infinite where a texel was found that has nothing.
+        let (statistic, degrees) = chi_square(&found, &expected).expect("enough texels");
+        let z = chi_square_z(statistic, degrees);
+        assert!(z < ONE_IN_A_HUNDRED, "{statistic} {degrees}");
         assert!(warp_through(&flux_levels(&[0.0; 16], 4), DVec2::splat(0.5)).is_none());
     }
 

@@ -77,7 +77,7 @@ pub fn triangle_power(radiance: DVec3, area: f64, double_sided: bool) -> DVec3 {
 pub(crate) const ROWS: &[Row] = &[
     Row {
         id: "PM-F-1",
-        name: "radiometry of point and spot lights, split into direct and indirect light",
+        name: "radiometry of point and spot lights, split into direct and indirect light, from one record a light, written anew where it moves (SVO-P1)",
         role: Role::PartOf("BG-3"),
         limits: "Points and spots have no extent: no ray meets them, so mirrors do not show them.",
         sources: &[
@@ -91,6 +91,9 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/paths/path_tracer.rs::point_spot_and_directional_lights_follow_their_laws",
             "tests/tests/paths/path_tracer.rs::lights_are_chosen_in_the_end_as_often_as_their_weights_say",
             "tests/tests/paths/path_tracer.rs::path_sets_are_a_partition",
+            "tests/tests/paths/scene_records.rs::kernels_load_every_word_of_a_record",
+            "tests/tests/paths/moving_lights.rs::a_light_that_moves_is_one_record",
+            "tests/tests/instant_radiosity/many_light/reflective.rs::powers_of_spots_and_of_parallel_light_are_closed_forms",
             "tests/tests/twins/lights.rs::lights_agree_with_their_twins",
         ],
         experiment: "clerestory agreement --scene cornell-point,sphere-flake",

@@ -1,12 +1,13 @@
 //! A window on a scene whose lamp moves, lit anew in every frame by many virtual lights.
 //!
-//! `many_lights [SCENE] [--lights N] [--placement walks|rsm|incremental|metropolis] [--visibility none|rays|maps] [--bound none|geometry|distance] [--interleave TILES]
+//! `many_lights [SCENE] [--lights N] [--placement walks|rsm|incremental|metropolis] [--visibility none|imperfect|maps|rays] [--bound none|geometry|distance] [--interleave TILES]
 //! [--history SHARE] [--turn DEGREES] [--camera NAME] [--exposure STOPS] [--size WxH] [--frames N] [--resize WxH] [--keys KEYS] [--screenshot FILE]`
 //!
 //! Each frame the lamp goes around the middle of the scene by `--turn`, its virtual lights are left anew where its light lands, and every pixel gathers the light
 //! of its part of them; with `--placement incremental` those that the lamp still sees stay where they are, with `metropolis` chains choose them among more. Space holds the lamp, and the picture converges. V goes on
-//! to the next way to tell who sees a virtual light, B to the next bound of its brightness up close, + and - double and halve the lights, F shows the tiles without
-//! their filter, H blends the light of virtual lights with that of the frame before or no longer, P goes on to the next part of the light: all, what lamps send directly, or what virtual lights bring. Otherwise as the viewer.
+//! to the next way to tell who sees a virtual light (nothing, imperfect shadow maps, exact ones, rays), B to the next bound of its brightness up close, + and - double and halve the lights, F shows the tiles without
+//! their filter, H blends the light of virtual lights with that of the frame before or no longer, P goes on to the next part of the light: all, what lamps send directly, or what virtual lights bring. G goes on to the next
+//! of a frame's buffers: places of what is seen in the box about the scene, its normals, direct light, indirect light before the filter and behind it, and the picture again. Otherwise as the viewer.
 //!
 //! Source of the program's form: S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR 2007.
 
@@ -16,7 +17,10 @@ use std::time::Instant;
 
 use clerestory::Result;
 use clerestory::film::PixelFormat;
-use clerestory::gpu::{Buffer, Gpu};
+use clerestory::gpu::shaders::constants::SHADING_NORMAL_BITS;
+use clerestory::gpu::{Area, Buffer, Gpu};
+use clerestory::maps::packed_direction::unpack_octahedral;
+use clerestory::raster::{self, GBuffer, GBufferDesc, Layering, Output};
 use clerestory::settings::TypedSettings;
 use clerestory::techniques::instant_radiosity::Bound;
 use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings, Placement, Visibility};
@@ -24,7 +28,9 @@ use clerestory::transport::{GpuScene, PathSet};
 use clerestory_samples::arguments::Arguments;
 use clerestory_samples::carousel::Carousel;
 use clerestory_samples::orbit::{Orbit, Pose};
+use clerestory_samples::panels::Sheet;
 use clerestory_samples::window::{self, Canvas, Show, Shown};
+use glam::{Vec3, Vec4};
 use winit::keyboard::{Key, NamedKey};
 
 const SCENE: &str = "builtin:cornell-box?source=point";
@@ -38,14 +44,45 @@ const LIGHTS_MIN: u32 = 16;
 const HISTORY: f32 = 0.9;
 /// Degrees that the lamp goes around each frame, unless told otherwise.
 const TURN: f64 = 3.0;
-const VISIBILITIES: [Visibility; 3] = [Visibility::Rays, Visibility::Maps, Visibility::None];
+/// From the cheapest to the exact one.
+const VISIBILITIES: [Visibility; 4] = [
+    Visibility::None,
+    Visibility::Imperfect,
+    Visibility::Maps,
+    Visibility::Rays,
+];
 const BOUNDS: [Bound; 3] = [Bound::Geometry, Bound::Distance, Bound::None];
+const DIRECT: &str = "bounces=1,lobes=diffuse+glossy";
+const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
 /// Parts of the light, with what a title calls them.
 const PARTS: [(&str, &str); 3] = [
     ("all light", "bounces=0..2,lobes=diffuse+glossy"),
     ("light of lamps", "bounces=0..1,lobes=diffuse+glossy"),
-    ("light of virtual lights", "bounces=2,lobes=diffuse+glossy"),
+    ("light of virtual lights", INDIRECT),
 ];
+
+/// What of a frame the window shows.
+#[derive(Clone, Copy, PartialEq)]
+enum Shows {
+    Picture,
+    Places,
+    Normals,
+    Direct,
+    /// Indirect light of the tiles back at their pixels.
+    Merged,
+    Filtered,
+}
+
+impl Shows {
+    const ALL: [Self; 6] = [
+        Self::Picture,
+        Self::Places,
+        Self::Normals,
+        Self::Direct,
+        Self::Merged,
+        Self::Filtered,
+    ];
+}
 
 fn main() -> ExitCode {
     clerestory_samples::report(run())
@@ -83,6 +120,7 @@ struct ManyLights {
     settings: ManyLightSettings,
     /// Index into [`PARTS`].
     part: usize,
+    shows: Shows,
     exposure: f32,
     format: PixelFormat,
     lamp: Carousel,
@@ -97,12 +135,19 @@ struct ManyLights {
 
 /// A picture of the window's size.
 struct View {
-    renderer: ManyLight,
+    content: Content,
     pixels: Buffer,
     size: [u32; 2],
     pose: Pose,
     /// Samples per pixel.
     samples: u32,
+}
+
+/// What a picture is made by.
+enum Content {
+    Light(Box<ManyLight>),
+    /// Places and normals alone.
+    Surfaces(Box<GBuffer>),
 }
 
 /// What follows an entry in a list, the first one after the last.
@@ -124,6 +169,7 @@ impl ManyLights {
             scene: Arc::new(scene),
             settings,
             part: 0,
+            shows: Shows::Picture,
             exposure: canvas.exposure,
             format: canvas.format,
             lamp,
@@ -135,21 +181,75 @@ impl ManyLights {
         })
     }
 
+    /// Settings of the light that is shown.
+    fn settings_shown(&self) -> Result<ManyLightSettings> {
+        let of = |path_set: &str, filter| -> Result<ManyLightSettings> {
+            Ok(ManyLightSettings {
+                path_set: path_set.parse()?,
+                filter,
+                ..self.settings.clone()
+            })
+        };
+        match self.shows {
+            Shows::Direct => of(DIRECT, self.settings.filter),
+            Shows::Merged => of(INDIRECT, false),
+            Shows::Filtered => of(INDIRECT, true),
+            Shows::Picture | Shows::Places | Shows::Normals => Ok(self.settings.clone()),
+        }
+    }
+
     /// A picture of another size, or with other settings.
     fn open(&self, orbit: &Orbit, size: [u32; 2]) -> Result<View> {
+        let content = match self.shows {
+            Shows::Places | Shows::Normals => {
+                let desc = GBufferDesc {
+                    size,
+                    layering: Layering::One,
+                    outputs: &[Output::Position, Output::Normals],
+                };
+                Content::Surfaces(Box::new(GBuffer::new(&self.gpu, &self.scene.surfaces(), &desc)?))
+            }
+            Shows::Picture | Shows::Direct | Shows::Merged | Shows::Filtered => {
+                let (scene, settings) = (Arc::clone(&self.scene), self.settings_shown()?);
+                let renderer = ManyLight::new(&self.gpu, scene, &orbit.camera(), size, settings)?;
+                Content::Light(Box::new(renderer))
+            }
+        };
         Ok(View {
-            renderer: ManyLight::new(
-                &self.gpu,
-                Arc::clone(&self.scene),
-                &orbit.camera(),
-                size,
-                self.settings.clone(),
-            )?,
+            content,
             pixels: window::pixels(&self.gpu, size)?,
             size,
             pose: orbit.pose(),
             samples: 0,
         })
+    }
+
+    /// What the camera sees, as colours: places in the box about the scene, or normals.
+    fn surfaces(&self, gbuffer: &GBuffer, orbit: &Orbit, size: [u32; 2]) -> Result<Sheet> {
+        let surfaces = self.scene.surfaces();
+        let view = raster::View::of_camera(&orbit.camera(), &surfaces, Area::whole(size))?;
+        let mut recorder = self.gpu.recorder("what is seen")?;
+        gbuffer.record(&mut recorder, &surfaces, &[view])?;
+        recorder.submit()?.wait()?;
+        let places: Vec<[f32; 4]> = gbuffer.read(&self.gpu, Output::Position)?;
+        let normals: Vec<[u32; 2]> = gbuffer.read(&self.gpu, Output::Normals)?;
+        let [lower, upper] = self.scene.bounds();
+        let mut sheet = Sheet::new(size, [0; 3]);
+        for (pixel, (place, words)) in (0..).zip(places.iter().zip(&normals)) {
+            // Zero where there is nothing.
+            if place[3] == 0.0 {
+                continue;
+            }
+            let color: Vec3 = match self.shows {
+                Shows::Normals => 0.5 + 0.5 * unpack_octahedral(words[1], SHADING_NORMAL_BITS).as_vec3(),
+                _ => (Vec4::from_array(*place).truncate() - lower) / (upper - lower),
+            };
+            let bytes = color
+                .to_array()
+                .map(|share| (255.0 * share.clamp(0.0, 1.0)).round() as u8);
+            sheet.put(pixel % size[0], pixel / size[0], bytes);
+        }
+        Ok(sheet)
     }
 
     /// Moves the lamp, and lets the picture begin anew for what has moved.
@@ -160,14 +260,17 @@ impl ManyLights {
             self.scene
                 .move_light(&self.gpu, self.lamp.light(), &self.lamp.at(self.angle))?;
         }
+        let Content::Light(renderer) = &mut view.content else {
+            return Ok(());
+        };
         // What is kept from frame to frame, lights or their light.
         let keeps = self.settings.placement == Placement::Incremental || self.settings.history > 0.0;
         if view.pose != orbit.pose() || (lamp_moves && keeps) {
-            view.renderer.set_camera(&orbit.camera())?;
+            renderer.set_camera(&orbit.camera())?;
             (view.pose, view.samples) = (orbit.pose(), 0);
         } else if lamp_moves {
             // The same walks leave the lamp wherever it is, so that virtual lights move with it instead of flickering.
-            view.renderer.restart(self.settings.seed)?;
+            renderer.restart(self.settings.seed)?;
             view.samples = 0;
         }
         Ok(())
@@ -178,6 +281,7 @@ impl ManyLights {
         let part = (self.part + 1) % PARTS.len();
         if let Ok(path_set) = PARTS[part].1.parse::<PathSet>() {
             (self.part, self.settings.path_set) = (part, path_set);
+            self.shows = Shows::Picture;
         }
     }
 }
@@ -194,8 +298,16 @@ impl Show for ManyLights {
             None => self.open(orbit, size)?,
         };
         view.samples += 1;
-        while view.renderer.step(view.samples)?.is_some() {}
-        view.renderer.display(&view.pixels, self.exposure, self.format)?;
+        match &mut view.content {
+            Content::Light(renderer) => {
+                while renderer.step(view.samples)?.is_some() {}
+                renderer.display(&view.pixels, self.exposure, self.format)?;
+            }
+            Content::Surfaces(gbuffer) => {
+                let sheet = self.surfaces(gbuffer, orbit, size)?;
+                self.gpu.upload(&view.pixels, 0, &sheet.bytes(self.format))?;
+            }
+        }
         let shown = Shown::since(begin, &view.pixels);
         self.view = Some(view);
         self.untold = (self.untold.0 + shown.seconds, self.untold.1 + 1);
@@ -205,9 +317,16 @@ impl Show for ManyLights {
     fn title(&mut self) -> String {
         let (seconds, frames) = std::mem::take(&mut self.untold);
         let s = &self.settings;
+        let shown = match self.shows {
+            Shows::Picture => PARTS[self.part].0,
+            Shows::Places => "places",
+            Shows::Normals => "normals",
+            Shows::Direct => "direct light",
+            Shows::Merged => "indirect light before the filter",
+            Shows::Filtered => "indirect light behind the filter",
+        };
         format!(
-            "{}: {} lights, visibility {:?}, bound {:?}, filter {}, history {}, {:.1} frames/s",
-            PARTS[self.part].0,
+            "{shown}: {} lights, visibility {:?}, bound {:?}, filter {}, history {}, {:.1} frames/s",
             s.lights,
             s.visibility,
             s.bound,
@@ -238,6 +357,7 @@ impl Show for ManyLights {
                 "f" => s.filter = !s.filter,
                 "h" => s.history = if s.history > 0.0 { 0.0 } else { HISTORY },
                 "p" => self.next_part(),
+                "g" => self.shows = next(&Shows::ALL, self.shows),
                 _ => return,
             },
             _ => return,

@@ -43,15 +43,32 @@ fn compensated_bounds_agree_with_the_path_tracer() {
         let mut sphere = builtin("builtin:sphere-light?rho=0.5&frequency=12");
         sphere.lights.clear();
         add_point(&mut sphere, Vec3::new(0.3, -0.2, 0.1), Vec3::ONE);
-        // Three decades about the bounds that would be chosen, of the one kind in the one scene, of the other in the other.
-        for (scene, bound, values) in [
-            (room(), Bound::Geometry, [(0.03, 4), (1.0, 4), (30.0, 16)]),
-            (sphere, Bound::Distance, [(4.0, 4), (0.1, 4), (0.004, 4)]),
-        ] {
+        // Three decades about the bounds that would be chosen, and of looser ones more walks, each of whose lights is less of a spike. Distances in the room, too, where
+        // edges of all lengths and angles meet.
+        let cases: [(_, &[(Bound, f32, u32)]); 2] = [
+            (
+                room(),
+                &[
+                    (Bound::Geometry, 0.03, 4),
+                    (Bound::Geometry, 1.0, 4),
+                    (Bound::Geometry, 30.0, 16),
+                    (Bound::Distance, 1.0, 4),
+                    (Bound::Distance, 0.03, 16),
+                ],
+            ),
+            (
+                sphere,
+                &[
+                    (Bound::Distance, 4.0, 4),
+                    (Bound::Distance, 0.1, 4),
+                    (Bound::Distance, 0.004, 4),
+                ],
+            ),
+        ];
+        for (scene, bounds) in cases {
             let reference = traced(gpu, &scene, 2048);
-            for (bound_value, walks) in values {
+            for &(bound, bound_value, walks) in bounds {
                 let settings = VirtualLightSettings {
-                    // Of looser bounds more lights, each of which is less of a spike.
                     walks,
                     bound,
                     bound_value,

@@ -60,35 +60,93 @@ fn bounds_leave_out_what_they_should() {
 fn steps_of_compensation_leave_a_geometric_series() {
     with_gpu(|gpu| {
         let scene = builtin("builtin:furnace-sphere?rho=0.8&emission=0.2&frequency=12");
-        let of = |compensation, compensation_steps| {
-            let settings = VirtualLightSettings {
-                walks: 64,
-                bound: Bound::Geometry,
-                // Half of every term.
-                bound_value: 0.125,
-                compensation,
-                compensation_steps,
-                // Passes are independent of each other all the same.
-                sampler: SamplerKind::Sobol,
-                ..settings()
-            };
-            let found = passes_of_size(gpu, &scene, [8; 2], &settings, 16);
-            found.means[0].clone()
-        };
         // Of the radiance of 1 an emission of 0.2 is no reflection.
         let emission = 0.2;
-        let all = of(Compensation::Rays, 0);
-        expect_mean_of("all steps", &all, 1.0, 0.0, FACETS);
         let reflected = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64 - emission;
-        for (what, values, left) in [
-            ("no compensation", of(Compensation::None, 0), 0.4),
-            ("one step", of(Compensation::Rays, 1), 0.16),
-            ("two steps", of(Compensation::Rays, 2), 0.064),
+        // ((1 - κ) ρ)ⁿ⁺¹ after n steps, where κ is the share of every term that its bound leaves.
+        for (share, all_left, allowed) in [
+            (0.5, &[0.4, 0.16, 0.064, 0.0256, 0.0102][..], FACETS),
+            // Roulette ends seven of ten paths behind the third step, and the light of the others is a quarter of all.
+            (0.1, &[0.72, 0.518, 0.373, 0.269][..], 2.0 * FACETS),
         ] {
-            // Of the same walks, so that what is left of their noise is that of a ratio.
-            let found = 1.0 - reflected(&values) / reflected(&all);
-            println!("{what}: {found:.4} left, expected {left}");
-            assert!((found - left).abs() < FACETS, "{what}: {found} instead of {left}");
+            let of = |compensation, compensation_steps| {
+                let settings = VirtualLightSettings {
+                    walks: 16,
+                    samples_per_pass: 2,
+                    bound: Bound::Geometry,
+                    bound_value: 0.25 * share as f32,
+                    compensation,
+                    compensation_steps,
+                    // Passes are independent of each other all the same.
+                    sampler: SamplerKind::Sobol,
+                    ..settings()
+                };
+                let found = passes_of_size(gpu, &scene, [8; 2], &settings, 16);
+                found.means[0].clone()
+            };
+            let all = of(Compensation::Rays, 0);
+            expect_mean_of(&format!("κ = {share}, all steps"), &all, 1.0, 0.0, FACETS);
+            for (steps, left) in (0..).zip(all_left) {
+                let values = match steps {
+                    0 => of(Compensation::None, 0),
+                    _ => of(Compensation::Rays, steps),
+                };
+                // Of the same walks, so that what is left of their noise is that of a ratio.
+                let found = 1.0 - reflected(&values) / reflected(&all);
+                println!("κ = {share}, {steps} steps: {found:.4} left, expected {left}");
+                assert!(
+                    (found - left).abs() < allowed.min(0.4 * left),
+                    "κ = {share}, {steps} steps: {found} instead of {left}"
+                );
+            }
         }
+    });
+}
+
+/// A bound that no edge meets compensates nothing, and one that leaves nothing of any is path tracing.
+#[test]
+fn loose_bounds_compensate_nothing_and_tight_ones_trace_paths() {
+    const LOOSE: f32 = 1e30;
+    const TIGHT: f32 = 1e-7;
+    with_gpu(|gpu| {
+        let scene = room();
+        let of = |bound, bound_value, compensation, most_bounces| {
+            let settings = VirtualLightSettings {
+                bound,
+                bound_value,
+                compensation,
+                most_bounces,
+                ..settings()
+            };
+            let mut renderer = renderer(gpu, &scene, SIZE, &settings);
+            let [radiance, _] = advance(&mut renderer, 4);
+            (radiance, renderer.counts().gather.gathers)
+        };
+        let expect_alike = |what: &str, found: &[f32], expected: &[f32]| {
+            let most = expected.iter().copied().fold(0.0, f32::max);
+            for (found, expected) in found.iter().zip(expected) {
+                let allowed = 1e-5 * (expected + most);
+                assert!((found - expected).abs() <= allowed, "{what}: {found} {expected}");
+            }
+        };
+        let (unbounded, gathers) = of(Bound::None, 0.0, Compensation::Rays, 0);
+        let (loose, gathers_of_loose) = of(Bound::Geometry, LOOSE, Compensation::Rays, 0);
+        expect_alike("loose", &loose, &unbounded);
+        // Each sample where it first arrives, and nowhere else.
+        assert_eq!((gathers, gathers_of_loose), (u64::from(4 * SIDE * SIDE), gathers));
+        // Nothing of what virtual lights bring is left: direct light alone, and with the compensation everything.
+        let (tight, _) = of(Bound::Geometry, TIGHT, Compensation::None, 0);
+        let (direct, _) = of(Bound::Geometry, TIGHT, Compensation::None, 1);
+        expect_alike("tight", &tight, &direct);
+        let settings = VirtualLightSettings {
+            walks: 1,
+            samples_per_pass: 4,
+            bound: Bound::Geometry,
+            bound_value: TIGHT,
+            ..settings()
+        };
+        let found = passes(gpu, &scene, &settings, 48);
+        found.expect_same_as("tight, compensated", &traced(gpu, &scene, 2048), 0.0);
+        assert!(found.counts.gather.gathers > 2 * u64::from(48 * 4 * SIDE * SIDE));
     });
 }

@@ -1,8 +1,10 @@
 //! Lights that move within a scene on the device: pictures are those of a scene that was made with the light there, to the bit.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use clerestory::gpu::Gpu;
+use clerestory::gpu::shaders::types::SceneLight;
 use clerestory::scene::{LightKind, Material, Scene};
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 use clerestory::techniques::{PathTracer, PathTracerSettings};
@@ -122,6 +124,37 @@ fn pictures_are_those_of_a_scene_made_with_the_light_there() {
         let other_seed = of_moving.each_mut().map(|picture| picture(4));
         assert!((0..2).all(|i| first[i] != other_seed[i]), "the seed stays");
         assert!(of_moving.each_mut().map(|picture| picture(3)) == first, "not as before");
+    });
+}
+
+/// One record goes to the device for each light that moves, and none for a picture.
+#[test]
+fn a_light_that_moves_is_one_record() {
+    const WORDS: usize = size_of::<SceneLight>() / size_of::<u32>();
+    with_gpu(|gpu| {
+        let before = scene();
+        let on_device = upload(gpu, &before);
+        let records = || -> Vec<u32> {
+            let lights = on_device.scene_set().scene_lights.buffer();
+            let words = lights.bytes() as usize / size_of::<u32>();
+            gpu.read(lights.view(), words).expect("records of lights")
+        };
+        let mut known = records();
+        assert!(known.len() >= 3 * WORDS);
+        let mut moved_records = BTreeSet::new();
+        let mut picture = path_tracer(gpu, &on_device, &before);
+        for (i, light) in before.lights.iter().enumerate().skip(1) {
+            on_device.move_light(gpu, i, &moved(&light.kind)).expect("moves");
+            let now = records();
+            let changed: Vec<usize> = (0..now.len()).filter(|word| now[*word] != known[*word]).collect();
+            let of: BTreeSet<usize> = changed.iter().map(|word| word / WORDS).collect();
+            assert_eq!(of.len(), 1, "light {i}: words {changed:?}");
+            moved_records.extend(of);
+            known = now;
+            picture(3);
+            assert_eq!(records(), known, "light {i}: a picture wrote lights");
+        }
+        assert_eq!(moved_records.len(), 3, "{moved_records:?}");
     });
 }
 

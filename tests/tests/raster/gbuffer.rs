@@ -168,6 +168,48 @@ fn what_is_seen_is_what_rays_meet() {
     });
 }
 
+/// Positions come back to the middles of their pixels.
+#[test]
+fn positions_project_to_the_middles_of_their_pixels() {
+    with_gpu(|gpu| {
+        for address in ["builtin:cornell-box", "builtin:box-room"] {
+            let scene = builtin(address);
+            let on_device = GpuScene::new(gpu, &scene).unwrap();
+            let surfaces = on_device.surfaces();
+            let desc = GBufferDesc {
+                size: SIZE,
+                layering: Layering::One,
+                outputs: &[Output::Triangle, Output::Position],
+            };
+            let gbuffer = GBuffer::new(gpu, &surfaces, &desc).unwrap();
+            let view = View::of_camera(&scene.cameras[0], &surfaces, Area::whole(SIZE)).unwrap();
+            draw(gpu, &gbuffer, &on_device, &[view]);
+            let corners = corners(&triangles(gpu, &on_device));
+            let index = Bvh2::build(&corners, &Default::default()).unwrap();
+            let hits = hits(&index, &view, SIZE);
+            let seen: Vec<u32> = gbuffer.read(gpu, Output::Triangle).unwrap();
+            let positions: Vec<[f32; 4]> = gbuffer.read(gpu, Output::Position).unwrap();
+            let (mut worst, mut met) = (0.0f64, 0);
+            for (pixel, (triangle, hit)) in seen.iter().zip(&hits).enumerate() {
+                // What is seen where the pixel's ray passes it lies as near to the ray as there is something.
+                if *triangle == NO_HIT || *triangle != hit.triangle {
+                    continue;
+                }
+                let [x, y, _, w] = view.project(Vec4::from_array(positions[pixel]).truncate().as_dvec3());
+                let place = [x, y].map(|clip| 0.5 * (clip / w + 1.0));
+                let middle = [pixel as u32 % SIZE[0], pixel as u32 / SIZE[0]].map(|i| f64::from(i) + 0.5);
+                for ((place, middle), side) in place.into_iter().zip(middle).zip(SIZE) {
+                    worst = worst.max((f64::from(side) * place - middle).abs());
+                }
+                met += 1;
+            }
+            println!("{address}: {worst:e} pixels off at most, of {met} pixels");
+            assert!(worst < 1e-3, "{address}: {worst}");
+            assert!(met > seen.len() / 2, "{address}: {met}");
+        }
+    });
+}
+
 /// The rule is not a wide one: pictures from a place that is off by a twentieth of a pixel break it.
 #[test]
 fn the_rule_finds_a_twentieth_of_a_pixel() {

@@ -454,6 +454,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/twins/edges.rs::what_a_bound_leaves_of_a_wall_is_the_published_table",
             "tests/tests/instant_radiosity/bounds.rs::steps_of_compensation_leave_a_geometric_series",
+            "tests/tests/instant_radiosity/bounds.rs::loose_bounds_compensate_nothing_and_tight_ones_trace_paths",
             "tests/tests/instant_radiosity/agreement.rs::compensated_bounds_agree_with_the_path_tracer",
         ],
         settings: &["compensation", "compensation_steps"],

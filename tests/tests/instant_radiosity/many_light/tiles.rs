@@ -156,6 +156,53 @@ fn filters_average_what_lies_in_one_plane_alone() {
     });
 }
 
+/// Virtual lights at one place so high above a floor that each brings the same to all of it, to the bit: squares of distances across are lost in that of the height.
+fn far_light() -> Scene {
+    const HEIGHT: f32 = 65_536.0;
+    let mut scene = Scene {
+        name: "far light".into(),
+        ..Scene::default()
+    };
+    let white = scene.add_material(Material::lambert("white", Vec3::new(0.8, 0.7, 0.3)));
+    scene.place(floor("floor", white, 2.0, 0.0));
+    scene.place(floor("ceiling", white, 1.0, HEIGHT));
+    scene.cameras.push(camera_down(1.0, 10.0));
+    scene.add_light(
+        "spot",
+        LightKind::Spot {
+            position: Vec3::Y * (HEIGHT - 1.0),
+            direction: Vec3::Y,
+            intensity: Vec3::splat(1e12),
+            inner: 0.009,
+            outer: 0.01,
+        },
+    );
+    scene
+}
+
+#[test]
+fn filters_leave_constants_as_they_are_to_the_bit() {
+    with_gpu(|gpu| {
+        let scene = far_light();
+        let with = |filter, whole_sets| {
+            let settings = ManyLightSettings {
+                lights: 20,
+                visibility: Visibility::None,
+                filter,
+                whole_sets,
+                ..exact()
+            };
+            bits(&picture(gpu, &scene, [13, 7], &of(INDIRECT, settings), 1))
+        };
+        let raw = with(false, true);
+        assert!(raw.iter().all(|word| *word != 0));
+        assert!(raw.chunks(3).all(|pixel| *pixel == raw[..3]), "not constant: {raw:x?}");
+        assert_eq!(with(true, true), raw);
+        // What is no constant it averages there.
+        assert_ne!(with(true, false), with(false, false));
+    });
+}
+
 /// The floor of [`terrace`] alone, its halves of two materials.
 fn halves(materials: [Material; 2]) -> Scene {
     let mut scene = terrace();

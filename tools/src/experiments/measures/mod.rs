@@ -176,6 +176,7 @@ measures! {
     on_device "ray-engine" rays::ray_engine;
     on_host "ray-offsets" rays::ray_offsets;
     on_device "reflection-maps" preview::reflection_maps;
+    on_device "rsm-discs" virtual_lights::rsm_discs;
     on_host "sample-sums" rendering::sample_sums;
     on_device "scene-profile" rendering::scene_profile;
     on_device "shadow-maps" preview::shadow_maps.of_any_scenes();
@@ -198,6 +199,7 @@ measures! {
     on_device "vpl-incremental" virtual_lights::vpl_incremental;
     on_host "vpl-order" virtual_lights::vpl_order;
     on_device "vpl-potential" virtual_lights::vpl_potential;
+    on_host "vpl-spikes" virtual_lights::vpl_spikes;
     on_host "vpl-walks" virtual_lights::vpl_walks;
     on_host "vpl-warp" preview::vpl_warp;
     on_device "walk-agreement" rendering::walk_agreement;

@@ -212,9 +212,9 @@ const DISPLAYED: &str = "bounces=0..2,lobes=diffuse+glossy+reflection+transmissi
 const ROWS: &[Row] = &[
     Row {
         id: "SVO-P12",
-        name: "technique `many-light`: deferred frames of direct light and of one reflection more, or several, by virtual lights, new for each frame or kept",
+        name: "technique `many-light`: deferred frames, on a G-buffer (SVO-P6), of direct light and of one reflection more, or several, by virtual lights, new for each frame or kept",
         role: Role::Technique,
-        limits: "Paths by lobes other than mirrors; one indirect bounce of reflective shadow maps and of kept lights, any number of walks and of chains, of which a tile has had all parts after as many frames as there are tiles; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated.",
+        limits: "Paths by lobes other than mirrors; one indirect bounce of reflective shadow maps and of kept lights, any number of walks and of chains, of which a tile has had all parts after as many frames as there are tiles; media, unlit surfaces, partial alpha and kept instances are refused; the bound is not compensated; frames wait for the device, as the count of lights is read back between walks and gather, so that they have steps of their own and cannot be recorded into a host's command buffer.",
         sources: &[
             sources::KELLER_1997.whole(),
             sources::SAITO_TAKAHASHI_1990.whole(),
@@ -238,9 +238,12 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/bounces.rs::tiles_have_all_bounces_over_as_many_frames",
             "tests/tests/instant_radiosity/many_light/tiles.rs::twice_the_lights_are_as_bright",
             "tests/tests/instant_radiosity/many_light/truths.rs::a_virtual_light_lights_a_plane_as_its_law_says",
+            "tests/tests/instant_radiosity/many_light/truths.rs::all_of_a_lights_power_arrives_on_the_plane",
+            "tests/tests/instant_radiosity/many_light/truths.rs::squares_have_their_form_factors_behind_a_blocker",
             "tests/tests/instant_radiosity/many_light/truths.rs::walls_that_emit_bring_their_own_radiosity",
             "tests/tests/instant_radiosity/many_light/truths.rs::errors_fall_with_the_root_of_the_lights",
             "tests/tests/instant_radiosity/many_light/bounces.rs::further_bounces_do_not_depend_on_how_work_is_shared_out",
+            "tests/tests/raster/gbuffer.rs::positions_project_to_the_middles_of_their_pixels",
             "tests/tests/instant_radiosity/many_light.rs::frames_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/instant_radiosity/many_light.rs::what_is_not_needed_is_not_recorded",
             "tests/tests/instant_radiosity/many_light.rs::scenes_without_lights_are_black_and_walks_that_leave_do_no_harm",
@@ -264,6 +267,7 @@ const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers",
             "tests/tests/instant_radiosity/many_light/truths.rs::points_light_a_plane_as_their_law_says",
+            "tests/tests/instant_radiosity/many_light/truths.rs::all_of_a_lights_power_arrives_on_the_plane",
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers_through_any_camera",
         ],
         settings: &["path_set"],
@@ -310,6 +314,7 @@ const ROWS: &[Row] = &[
         )),
         tests: &[
             "tests/tests/instant_radiosity/many_light/tiles.rs::filters_average_what_lies_in_one_plane_alone",
+            "tests/tests/instant_radiosity/many_light/tiles.rs::filters_leave_constants_as_they_are_to_the_bit",
             "tests/tests/instant_radiosity/many_light/tiles.rs::filters_divide_by_all_that_a_surface_scatters",
             "tests/tests/instant_radiosity/many_light/tiles.rs::filtered_tiles_are_nearly_what_all_lights_bring",
             "tests/tests/instant_radiosity/many_light/truths.rs::filters_leave_a_sixteenth_of_the_noise",
@@ -344,6 +349,7 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/reflective.rs::black_maps_give_no_lights",
             "tests/tests/instant_radiosity/many_light/reflective.rs::reflective_maps_are_drawn_for_no_others_and_shared_out_alike",
         ],
+        api: &["clerestory::techniques::instant_radiosity::many_light::ReflectiveMap"],
         settings: &["placement", "rsm_side", "rsm_sequence", "emitters"],
         ..Row::of("engine/src/techniques/instant_radiosity/many_light/reflective.rs")
     },
@@ -362,6 +368,9 @@ const ROWS: &[Row] = &[
         )),
         needs: NEEDS,
         tests: &[
+            "tests/tests/instant_radiosity/many_light/discs.rs::a_virtual_light_on_each_texel_brings_the_sum_of_all_texels",
+            "tests/tests/instant_radiosity/many_light/discs.rs::discs_have_the_sum_of_their_texels_as_their_mean",
+            "tests/tests/instant_radiosity/many_light/discs.rs::light_through_everything_exceeds_that_of_rays_by_what_is_hidden",
             "tests/tests/instant_radiosity/many_light/discs.rs::discs_over_all_texels_bring_what_all_lights_do",
             "tests/tests/instant_radiosity/many_light/discs.rs::discs_need_reflective_maps_and_no_lights",
             "engine/src/raster/reflective.rs::discs_are_weighted_by_the_inverse_of_their_density",
@@ -525,6 +534,7 @@ const ROWS: &[Row] = &[
         needs: &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"],
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays",
+            "tests/tests/instant_radiosity/many_light/truths.rs::squares_have_their_form_factors_behind_a_blocker",
             "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",
         ],
         settings: &["map_side"],

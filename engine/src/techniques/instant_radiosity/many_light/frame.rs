@@ -295,7 +295,7 @@ impl ManyLight {
     }
 
     /// Reflective shadow maps, where virtual lights come from them.
-    fn reflective(&self) -> Option<&Reflective> {
+    pub(super) fn reflective(&self) -> Option<&Reflective> {
         match self.indirect.as_ref().map(|indirect| &indirect.source) {
             Some(LightSource::Reflective(reflective)) => Some(reflective),
             _ => self.discs.as_ref().map(|discs| &discs.reflective),
@@ -314,6 +314,7 @@ impl ManyLight {
         };
         let all = reflective.views(&self.gpu, &self.scene.surfaces())?;
         self.counts.views += all.len() as u64;
+        self.viewed = all.len() as u32;
         let views = LightViews {
             all,
             next: 0,

@@ -12,6 +12,12 @@
 //! lights, and sums go back to their pixels, where a filter averages those of neighbours on the same surface; a [`history`] blends them with those of the frame before, for
 //! frames that are shown one by one. On a film frames with a history are no independent samples: their mean is the same where nothing moves, but its variance is more than it says.
 //!
+//! # A technique of steps
+//!
+//! It is a [`Technique`](crate::techniques::Technique) with steps of its own and no [`FrameMethod`](crate::techniques::FrameMethod), which records a whole frame into a host's command buffer and waits for nothing. A frame here
+//! waits for the device: how many virtual lights have landed is read back between the walks and the gather, which is recorded for as many; what the lights' views are drawn from, and whether they reflect anything,
+//! before their lights; whether any place has lights left, or a ray that a quota has stopped, between sweeps. A host calls [`step`](ManyLight::step) and takes the picture from [`display`](ManyLight::display) or [`picture`](ManyLight::picture).
+//!
 //! # Bias
 //!
 //! Against the same light paths, `bounces=0..2`, or up to more, by lobes other than mirrors:
@@ -57,11 +63,13 @@ mod metropolis;
 mod past;
 mod records;
 mod reflective;
+mod reflective_map;
 mod renderer;
 mod reservoirs;
 mod settings;
 
 pub(in crate::techniques) use card::CARD;
 pub use interleave::Interleaving;
+pub use reflective_map::{PixelLight, ReflectiveMap};
 pub use renderer::{ManyLight, ManyLightCounts};
 pub use settings::{Gathering, ManyLightSettings, Placement, RsmSequence, Visibility};

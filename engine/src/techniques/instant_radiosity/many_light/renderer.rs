@@ -62,6 +62,9 @@ pub struct ManyLightCounts {
 }
 
 /// A rendering of one view by frames of many lights.
+///
+/// It goes on by [`step`](Self::step), each of which waits for the device: the count of virtual lights is read back between walks and gather. So it is no
+/// [`FrameMethod`](crate::techniques::FrameMethod), and cannot be recorded into a command buffer of a host.
 pub struct ManyLight {
     pub(super) gpu: Gpu,
     pub(super) scene: Arc<GpuScene>,
@@ -84,6 +87,8 @@ pub struct ManyLight {
     pub(super) before: u32,
     /// Virtual lights that a frame has placed last.
     pub(super) placed: u32,
+    /// Views of lights that a frame has drawn last.
+    pub(super) viewed: u32,
     pub(super) counts: ManyLightCounts,
 }
 
@@ -218,6 +223,7 @@ impl ManyLight {
             done: 0,
             before: 0,
             placed: 0,
+            viewed: 0,
             counts: ManyLightCounts::default(),
             scene,
         })

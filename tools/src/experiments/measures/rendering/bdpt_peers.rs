@@ -1,7 +1,8 @@
-//! Bidirectional paths beside those of LuxCore: time to equal error on exported scenes of diffuse surfaces, in turns, and where our time goes.
+//! Bidirectional paths beside those of LuxCore, and both they and virtual lights beside Mitsuba's path tracer: time to equal error on exported scenes of diffuse surfaces, in turns, and where
+//! the time of our bidirectional paths goes.
 //!
-//! LuxCore runs in a process of its own through `tools/mitsuba/bidirectional.py`, with the Python that has it; where there is none, a table says so. Errors are those of the
-//! spread between pictures, each about its own renderer's mean, so that what one renderer models otherwise counts for neither.
+//! LuxCore and Mitsuba run in processes of their own through `tools/mitsuba/bidirectional.py` and `tools/mitsuba/reference.py`, with the Python that has them; where there is none, a table says so. Errors are
+//! those of the spread between pictures, each about its own renderer's mean, so that what one renderer models otherwise counts for none of them. In scenes without mirrors virtual lights have all light paths.
 
 use std::path::Path;
 use std::process::Command;
@@ -30,15 +31,24 @@ const SIDE: u32 = 64;
 const SMOKE_SIDE: u32 = 16;
 const SAMPLES: u32 = 64;
 const SMOKE_SAMPLES: u32 = 4;
+/// Techniques of ours, with the samples per pixel of a picture; the same of a smoke run. Virtual lights send a shadow ray to each light from each sample.
+const OURS: [(&str, [u32; 2]); 2] = [("bdpt", [SAMPLES, SMOKE_SAMPLES]), ("vpl", [4, 1])];
+/// Other renderers, by their places behind ours in a turn.
+const THEIRS: [&str; 2] = ["LuxCore", "Mitsuba"];
+const LUXCORE: usize = 0;
+const MITSUBA: usize = 1;
 /// Each renderer's turns, and its pictures in each.
 const TURNS: usize = 5;
 const PICTURES: u32 = 2;
-const SCRIPTS: [(&str, &str); 2] = [
+const SCRIPTS: [(&str, &str); 3] = [
     ("photons.py", include_str!("../../../../mitsuba/photons.py")),
     (SCRIPT, include_str!("../../../../mitsuba/bidirectional.py")),
+    (MITSUBA_SCRIPT, include_str!("../../../../mitsuba/reference.py")),
 ];
 const SCRIPT: &str = "bidirectional.py";
+const MITSUBA_SCRIPT: &str = "reference.py";
 const NEEDED: &str = "pyluxcore; see tools/mitsuba/README.md";
+const MITSUBA_NEEDED: &str = "Mitsuba 3; see tools/mitsuba/README.md";
 /// Bytes of a turn's pictures at most.
 const FILE_MAX: u64 = 1 << 28;
 /// Standard errors to each side of an interval.
@@ -59,6 +69,20 @@ rows! {
     }
 }
 rows! {
+    /// A technique of ours and Mitsuba's path tracer on a scene.
+    struct Beside = "Beside Mitsuba's path tracer" by [scene, technique] {
+        scene: String = "scene",
+        technique: String = "our technique",
+        version: String = "version",
+        ours: Repeats = "our picture (s)",
+        theirs: Repeats = "Mitsuba's picture (s)",
+        our_error: Measured = "our relative MSE",
+        their_error: Measured = "Mitsuba's relative MSE",
+        over: Measured = "Mitsuba's time to equal error over ours",
+        brightness: Measured = "our mean over Mitsuba's",
+    }
+}
+rows! {
     /// A pass of our pictures.
     struct Pass = "Where our time goes" by [scene, pass] {
         scene: String = "scene",
@@ -67,9 +91,10 @@ rows! {
     }
 }
 rows! {
-    /// A scene that LuxCore did not render.
-    struct LeftOut = "Left out" by [scene] {
+    /// A scene that another renderer did not render.
+    struct LeftOut = "Left out" by [scene, renderer] {
         scene: String = "scene",
+        renderer: String = "renderer",
         cause: String = "cause",
     }
 }
@@ -78,9 +103,18 @@ rows! {
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
     rows: Vec<Row>,
+    #[serde(default)]
+    beside: Vec<Beside>,
     passes: Vec<Pass>,
     left_out: Vec<LeftOut>,
 }
+
+const OF_MITSUBA: &[Criterion<Beside>] = &[Criterion::each(
+    "our mean is Mitsuba's within 0.5 %: ratio",
+    Bound::Between(0.995, 1.005),
+    |row: &Beside| row.brightness,
+)
+.needs("Mitsuba")];
 
 const CRITERIA: &[Criterion<Row>] = &[Criterion::each(
     "LuxCore's time to equal error is half of ours or more",
@@ -96,16 +130,27 @@ struct Answer {
     seconds: Vec<f64>,
 }
 
+/// What Mitsuba's script writes, as far as it is needed here.
+#[derive(serde::Deserialize)]
+struct MitsubaAnswer {
+    renderer: String,
+    variant: String,
+    seconds_each: Vec<f64>,
+}
+
 /// Pictures of a turn, with the seconds of each.
 type Turn = Vec<(Vec<f32>, f64)>;
 
 /// One renderer's turns.
+#[derive(Clone)]
 struct Contender {
     seconds: Repeats,
     error: Measured,
     /// Relative standard error of the time to an error.
     uncertainty: f64,
     mean: f64,
+    /// Standard error of the mean.
+    mean_error: f64,
 }
 
 impl Contender {
@@ -122,9 +167,13 @@ impl Contender {
         let found = spread::measure(&pictures, &mean)?;
         let middle = median(seconds.0.clone());
         let deviation = seconds.0.iter().map(|s| (s / middle - 1.0).powi(2)).sum::<f64>();
+        let means: Vec<f64> = pictures.iter().map(|one| mean_of(one)).collect();
+        let of_all = means.iter().sum::<f64>() / means.len() as f64;
+        let squares: f64 = means.iter().map(|one| (one - of_all).powi(2)).sum();
         let of_seconds = (deviation / (seconds.0.len() as f64 - 1.0).max(1.0) / seconds.0.len() as f64).sqrt();
         Some(Self {
-            mean: mean.iter().map(|value| f64::from(*value)).sum::<f64>() / values as f64,
+            mean: of_all,
+            mean_error: (squares / (means.len() as f64 - 1.0).max(1.0) / means.len() as f64).sqrt(),
             error: Measured::within(found.relative_mse, MARGIN * found.standard_error),
             uncertainty: (found.standard_error / found.relative_mse).hypot(of_seconds),
             seconds,
@@ -135,6 +184,24 @@ impl Contender {
     fn cost(&self) -> f64 {
         median(self.seconds.0.clone()) * self.error.value
     }
+
+    /// Another one's time to equal error over this one's.
+    fn time_of(&self, other: &Self) -> Measured {
+        let ratio = other.cost() / self.cost();
+        Measured::within(ratio, MARGIN * ratio * self.uncertainty.hypot(other.uncertainty))
+    }
+
+    /// The mean over another one's.
+    fn brightness_over(&self, other: &Self) -> Measured {
+        let ratio = self.mean / other.mean;
+        let error = (self.mean_error / self.mean).hypot(other.mean_error / other.mean);
+        Measured::within(ratio, MARGIN * ratio * error)
+    }
+}
+
+/// Mean of values.
+fn mean_of(values: &[f32]) -> f64 {
+    values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len() as f64
 }
 
 impl Study for Found {
@@ -144,19 +211,17 @@ impl Study for Found {
         for (name, text) in SCRIPTS {
             atomic::write(&context.file(name)?, text.as_bytes())?;
         }
-        let (mut left_out, mut passes) = (Vec::new(), Vec::new());
+        let mut found = Self::default();
         let name = |address: &&str| short_name(address).to_owned();
         let rows = context.each(context.first(&SCENES, 1), name, |address| {
-            let (row, found) = of_scene(context, &gpu, &python, address)?;
-            passes.extend(found);
-            let alone = |cause| LeftOut {
-                scene: short_name(address).into(),
-                cause,
-            };
-            left_out.extend(row.as_ref().err().cloned().map(alone));
-            Ok(Vec::from_iter(row.ok()))
+            let mut of_scene = of_scene(context, &gpu, &python, address)?;
+            found.beside.append(&mut of_scene.beside);
+            found.passes.append(&mut of_scene.passes);
+            found.left_out.append(&mut of_scene.left_out);
+            Ok(of_scene.rows)
         })?;
-        Ok(Self { rows, passes, left_out })
+        found.rows = rows;
+        Ok(found)
     }
 
     fn findings(&self) -> Findings {
@@ -170,18 +235,17 @@ impl Study for Found {
                  pictures, each about its own renderer's mean, since LuxCore's bidirectional engine is brighter than its own path tracer, whose mean stands beside. LuxCore's seconds have its \
                  preparation of a picture, ours those of a technique on a scene that is on the device.",
             ))
+            .and(Findings::of(&self.beside, OF_MITSUBA).note(format!(
+                "As above; {} samples per pixel of virtual lights, {SAMPLES} of Mitsuba's path tracer with independent samples. Its seconds have no preparation of a picture.",
+                OURS[1].1[0]
+            )))
             .and(Findings::of(&self.passes, &[]))
             .and(Findings::of(&self.left_out, &[]))
     }
 }
 
-/// Both renderers in turns, or why there is one alone; and the shares of our passes. A smoke run has ours alone.
-fn of_scene(
-    context: &Context<'_>,
-    gpu: &Gpu,
-    python: &Path,
-    address: &str,
-) -> Result<(std::result::Result<Row, String>, Vec<Pass>)> {
+/// All renderers in turns, what those that are missing are missing for, and the shares of the passes of our bidirectional paths. A smoke run has ours alone.
+fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> Result<Found> {
     let scene = scene::load(address)?;
     let name = short_name(address);
     let side = context.pick(SIDE, SMOKE_SIDE);
@@ -190,35 +254,96 @@ fn of_scene(
     let exported = mitsuba::export_with(&scene, "", [side; 2], &folder, options);
     let renderer = Renderer::new(gpu, &scene)?;
     let mut passes = Vec::new();
-    let mut cause = None;
-    let mut version = String::new();
+    let mut causes: [Option<String>; THEIRS.len()] = Default::default();
+    let mut versions: [String; THEIRS.len()] = Default::default();
     let mut seed = 0;
-    let contenders = context.pick(2, 1);
+    let contenders = OURS.len() + context.pick(THEIRS.len(), 0);
     let turns = context.in_turns(TURNS, contenders, |i| {
         seed += PICTURES + 1;
-        if i == 0 {
-            return our_turn(context, &renderer, seed, &mut passes);
-        }
-        if cause.is_some() || context.watch.stopped() {
+        let Some(peer) = i.checked_sub(OURS.len()) else {
+            let (turn, of_turn) = our_turn(context, &renderer, OURS[i], seed)?;
+            if i == 0 {
+                passes = of_turn;
+            }
+            return Ok(turn);
+        };
+        if causes[peer].is_some() || context.watch.stopped() {
             return Ok(Turn::new());
         }
         let answer = match &exported {
-            Ok(exported) => their_turn(context, python, ("BIDIRCPU", &exported.scene), &folder, seed),
+            Ok(exported) if peer == LUXCORE => {
+                their_turn(context, python, ("BIDIRCPU", &exported.scene), &folder, seed)
+            }
+            Ok(exported) => mitsuba_turn(context, python, &exported.scene, &folder, seed),
             Err(cause) => Err(Error::setting("scene", address, cause.to_string())),
         };
         Ok(match answer {
-            Ok((turn, found)) => {
-                version = found;
+            Ok((turn, version)) => {
+                versions[peer] = version;
                 turn
             }
-            Err(found) => {
-                cause = Some(found.to_string());
+            Err(cause) => {
+                causes[peer] = Some(cause.to_string());
                 Turn::new()
             }
         })
     })?;
+    let all: Vec<Option<Contender>> = turns.into_iter().map(Contender::of).collect();
+    let contender = |i: usize| all.get(i).cloned().flatten();
+    let [luxcore, mitsuba] = [LUXCORE, MITSUBA].map(|peer| match &causes[peer] {
+        Some(cause) => Err(cause.clone()),
+        None if context.smoke => Err("smoke runs have ours alone".into()),
+        None => {
+            contender(OURS.len() + peer).ok_or_else(|| String::from("it was stopped before there were pictures enough"))
+        }
+    });
+    let mut found = Found::default();
+    for (peer, missing) in [luxcore.as_ref().err(), mitsuba.as_ref().err()].into_iter().enumerate() {
+        found.left_out.extend(missing.map(|cause| LeftOut {
+            scene: name.into(),
+            renderer: THEIRS[peer].into(),
+            cause: cause.clone(),
+        }));
+    }
+    if let (Some(ours), Ok(theirs)) = (contender(0), luxcore) {
+        // What fails here costs a number, not the scene.
+        let turn = exported.as_ref().ok().and_then(|exported| {
+            let paths = ("PATHCPU", exported.scene.as_path());
+            their_turn(context, python, paths, &folder, seed).ok()
+        });
+        let of_paths = turn.map_or(f64::NAN, |(turn, _)| {
+            let means = turn.iter().map(|(picture, _)| mean_of(picture));
+            means.sum::<f64>() / turn.len() as f64
+        });
+        found.rows.push(Row {
+            scene: name.into(),
+            version: versions[LUXCORE].clone(),
+            over: ours.time_of(&theirs),
+            brightness: theirs.mean / ours.mean,
+            of_paths: of_paths / ours.mean,
+            our_error: ours.error,
+            their_error: theirs.error,
+            ours: ours.seconds,
+            theirs: theirs.seconds,
+        });
+    }
+    if let Ok(theirs) = mitsuba {
+        for (i, (technique, _)) in OURS.iter().enumerate() {
+            found.beside.extend(contender(i).map(|ours| Beside {
+                scene: name.into(),
+                technique: (*technique).into(),
+                version: versions[MITSUBA].clone(),
+                over: ours.time_of(&theirs),
+                brightness: ours.brightness_over(&theirs),
+                our_error: ours.error,
+                their_error: theirs.error,
+                ours: ours.seconds,
+                theirs: theirs.seconds.clone(),
+            }));
+        }
+    }
     let all: f64 = passes.iter().map(|(_, ms)| ms).sum();
-    let mut shares: Vec<Pass> = passes
+    found.passes = passes
         .into_iter()
         .map(|(pass, ms)| Pass {
             scene: name.into(),
@@ -226,55 +351,33 @@ fn of_scene(
             share: 100.0 * ms / all,
         })
         .collect();
-    shares.sort_by(|a, b| b.share.total_cmp(&a.share));
-    let mut both = turns.into_iter().map(Contender::of);
-    let (ours, theirs) = (both.next().flatten(), both.next().flatten());
-    let row = match (ours, theirs, cause) {
-        (Some(ours), Some(theirs), None) => {
-            // What fails here costs a number, not the scene.
-            let turn = exported.as_ref().ok().and_then(|exported| {
-                let paths = ("PATHCPU", exported.scene.as_path());
-                their_turn(context, python, paths, &folder, seed).ok()
-            });
-            let of_paths = turn.map_or(f64::NAN, |(turn, _)| {
-                let values = || turn.iter().flat_map(|(picture, _)| picture);
-                values().map(|value| f64::from(*value)).sum::<f64>() / values().count() as f64
-            });
-            let ratio = theirs.cost() / ours.cost();
-            Ok(Row {
-                scene: name.into(),
-                version,
-                over: Measured::within(ratio, MARGIN * ratio * ours.uncertainty.hypot(theirs.uncertainty)),
-                brightness: theirs.mean / ours.mean,
-                of_paths: of_paths / ours.mean,
-                our_error: ours.error,
-                their_error: theirs.error,
-                ours: ours.seconds,
-                theirs: theirs.seconds,
-            })
-        }
-        (_, _, Some(cause)) => Err(cause),
-        (_, _, None) if contenders == 1 => Err("smoke runs have ours alone".into()),
-        _ => Err("it was stopped before there were pictures enough".into()),
-    };
-    Ok((row, shares))
+    found.passes.sort_by(|a, b| b.share.total_cmp(&a.share));
+    Ok(found)
 }
 
-/// A turn of ours. The passes are those of its last picture.
-fn our_turn(context: &Context<'_>, renderer: &Renderer, seed: u32, passes: &mut Vec<(String, f64)>) -> Result<Turn> {
-    let mut turn = Turn::new();
+/// Milliseconds of a picture's passes, by name.
+type PassTimes = Vec<(String, f64)>;
+
+/// A turn of a technique of ours, and the passes of its last picture.
+fn our_turn(
+    context: &Context<'_>,
+    renderer: &Renderer,
+    (technique, samples): (&str, [u32; 2]),
+    seed: u32,
+) -> Result<(Turn, PassTimes)> {
+    let (mut turn, mut passes) = (Turn::new(), PassTimes::new());
     for picture in 0..PICTURES {
         let options = RenderOptions {
-            technique: Some("bdpt".into()),
+            technique: Some(technique.into()),
             size: [context.pick(SIDE, SMOKE_SIDE); 2],
-            spp: context.pick(SAMPLES, SMOKE_SAMPLES),
+            spp: context.pick(samples[0], samples[1]),
             seed: seed + picture,
             settings: serde_json::json!({ "sampler": "pcg" }).into(),
             ..RenderOptions::default()
         };
         let (rendered, seconds) = timed(|| renderer.render(&options));
         let rendered = rendered?;
-        *passes = rendered
+        passes = rendered
             .report
             .passes
             .iter()
@@ -283,7 +386,48 @@ fn our_turn(context: &Context<'_>, renderer: &Renderer, seed: u32, passes: &mut 
         let radiance = rendered.picture.require(picture::RADIANCE)?.values().to_vec();
         turn.push((radiance, seconds));
     }
-    Ok(turn)
+    Ok((turn, passes))
+}
+
+/// Pictures of so many pixels a side from a file of 32-bit floats.
+fn pictures_of(file: &Path, side: u32) -> Result<Vec<Vec<f32>>> {
+    let bytes = read_file(file, FILE_MAX)?;
+    let values: Vec<f32> = bytes
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .map(|word| f32::from_le_bytes(*word))
+        .collect();
+    let pictures = values.chunks_exact(3 * (side * side) as usize);
+    Ok(pictures.map(<[f32]>::to_vec).collect())
+}
+
+/// A turn of Mitsuba's path tracer, and its version.
+fn mitsuba_turn(
+    context: &Context<'_>,
+    python: &Path,
+    scene: &Path,
+    folder: &Path,
+    seed: u32,
+) -> Result<(Turn, String)> {
+    let prefix = folder.join("mitsuba");
+    let mut command = Command::new(python);
+    command
+        .arg(context.folder.join(MITSUBA_SCRIPT))
+        .args([scene.as_os_str(), prefix.as_os_str()])
+        .args(["--integrator", "path", "--sampler", "independent", "--each"])
+        .args(["--spp", &context.pick(SAMPLES, SMOKE_SAMPLES).to_string()])
+        .args(["--passes", &PICTURES.to_string()])
+        .args(["--seed", &seed.to_string()]);
+    if python::run(python, &mut command, MITSUBA_NEEDED, context.watch)?.is_none() {
+        return Ok((Turn::new(), String::new()));
+    }
+    let bytes = read_file(&prefix.with_extension("json"), FILE_MAX)?;
+    let answer: MitsubaAnswer = serde_json::from_slice(&bytes)
+        .map_err(|cause| Error::setting("mitsuba", String::from_utf8_lossy(&bytes), cause.to_string()))?;
+    let pictures = pictures_of(&prefix.with_extension("f32"), context.pick(SIDE, SMOKE_SIDE))?;
+    let version = format!("{}, {}", answer.renderer, answer.variant);
+    Ok((pictures.into_iter().zip(answer.seconds_each).collect(), version))
 }
 
 /// A turn of LuxCore's, and its version.
@@ -311,13 +455,6 @@ fn their_turn(
     };
     let answer: Answer =
         serde_json::from_str(&text).map_err(|cause| Error::setting("luxcore", text, cause.to_string()))?;
-    let bytes = read_file(&file, FILE_MAX)?;
-    let values: Vec<f32> = bytes
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|word| f32::from_le_bytes(*word))
-        .collect();
-    let pictures = values.chunks_exact(3 * (side * side) as usize).map(<[f32]>::to_vec);
-    Ok((pictures.zip(answer.seconds).collect(), answer.version))
+    let pictures = pictures_of(&file, side)?;
+    Ok((pictures.into_iter().zip(answer.seconds).collect(), answer.version))
 }

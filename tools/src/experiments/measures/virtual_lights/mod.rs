@@ -1,10 +1,12 @@
-//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, and orders in which points take them; on the device those that are kept from frame to frame,
-//! and light that is.
+//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, their spikes, and orders in which points take them; on the device those that are kept from frame to frame,
+//! light that is, and what discs of reflective shadow maps have of it.
 
 pub mod deferred_stages;
+pub mod rsm_discs;
 mod unit_box;
 pub mod vpl_history;
 pub mod vpl_incremental;
 pub mod vpl_order;
 pub mod vpl_potential;
+pub mod vpl_spikes;
 pub mod vpl_walks;

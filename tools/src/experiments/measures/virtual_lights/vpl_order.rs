@@ -81,10 +81,21 @@ rows! {
     }
 }
 
+rows! {
+    /// A light of one point.
+    struct Rank = "Potential of one point's lights by rank" by [walks, rank] {
+        walks: u64 = "walks",
+        rank: u64 = "rank",
+        potential: f64 = "potential over that of the strongest",
+    }
+}
+
 /// What was found.
 #[derive(Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
     shares: Vec<Share>,
+    #[serde(default)]
+    ranks: Vec<Rank>,
     curve: Vec<Curve>,
     rules: Vec<Row>,
     parts: Vec<Part>,
@@ -258,6 +269,9 @@ const OF_RULES: &[Criterion<Row>] = &[
 const VISIBILITY: &str = "visibility";
 const POTENTIAL: &str = "potential";
 const SORT: &str = "sorts at every point, beside it";
+const FIFTH_SORT: &str = "sorts at every 5th point, beside it";
+/// Points from one that has its lights sorted to the next, of parts that are timed by themselves; none of the first.
+const SORTS: [Option<usize>; 3] = [None, Some(1), Some(5)];
 const OF_PARTS: &[Criterion<Part>] = &[Criterion::each(
     "most of the time is visibility's: share (%)",
     Bound::AtLeast(50.0),
@@ -341,21 +355,38 @@ impl Pixels {
         brought
     }
 
-    /// Seconds of finding the potentials alone, and with sorts at every point.
-    fn without_rays(&self, sorts: bool) -> f64 {
+    /// Seconds of finding the potentials alone, or with sorts at every so many points.
+    fn without_rays(&self, sorts: Option<usize>) -> f64 {
         let (mut potentials, mut keys) = (Vec::new(), Vec::new());
         let mut sum = 0.0;
         let clock = Instant::now();
-        for point in &self.points {
+        for (i, point) in self.points.iter().enumerate() {
             self.potentials(point, &mut potentials, &mut keys);
             sum += keys.first().copied().unwrap_or(0.0);
-            if sorts {
+            if sorts.is_some_and(|period| i % period == 0) {
                 sum += f64::from(order_by_potential(&keys).first().copied().unwrap_or(0));
             }
         }
         let seconds = clock.elapsed().as_secs_f64();
         std::hint::black_box(sum);
         seconds
+    }
+
+    /// What each light might bring to the point in the middle of the picture, the strongest first, of those that might bring something.
+    fn ranks(&self, walks: u32, size: [u32; 2]) -> Vec<Rank> {
+        let (mut potentials, mut keys) = (Vec::new(), Vec::new());
+        let middle = (size[1] / 2 * size[0] + size[0] / 2) as usize;
+        self.potentials(&self.points[middle], &mut potentials, &mut keys);
+        let ordered = order_by_potential(&keys);
+        let ordered: Vec<f64> = ordered.iter().map(|light| keys[*light as usize]).collect();
+        let strongest = ordered.first().copied().unwrap_or(f64::NAN);
+        let bring = (1..).zip(ordered).filter(|(_, key)| *key > 0.0);
+        let rank = |(rank, key): (u64, f64)| Rank {
+            walks: walks.into(),
+            rank,
+            potential: key / strongest,
+        };
+        bring.map(rank).collect()
     }
 
     fn shares(&self, walks: u32, seed: u32) -> (Share, Vec<Curve>) {
@@ -441,10 +472,12 @@ impl Study for Found {
         };
         let mut found = Self::default();
         for (walks, seed) in context.first(&WALKS, 2) {
-            let (share, mut curve) = pixels(*walks, *seed)?.shares(*walks, *seed);
+            let pixels = pixels(*walks, *seed)?;
+            let (share, mut curve) = pixels.shares(*walks, *seed);
             found.shares.push(share);
             if *seed == 0 {
                 found.curve.append(&mut curve);
+                found.ranks = pixels.ranks(*walks, size);
             }
         }
         let pixels = pixels(WALKS[0].0, WALKS[0].1)?;
@@ -454,10 +487,10 @@ impl Study for Found {
         // Half of the points are saturated.
         let saturation = sorted[sorted.len() / 2];
         let by = |i: usize| pixels.picture(RULES[i].1, RULES[i].2 / 100.0, saturation);
-        let times = context.in_turns(5, RULES.len() + 2, |i| {
+        let times = context.in_turns(5, RULES.len() + SORTS.len(), |i| {
             Ok(match i.checked_sub(RULES.len()) {
                 None => by(i).seconds,
-                Some(part) => pixels.without_rays(part > 0),
+                Some(part) => pixels.without_rays(SORTS[part]),
             })
         })?;
         let times: Vec<Repeats> = times.into_iter().map(Repeats).collect();
@@ -483,12 +516,13 @@ impl Study for Found {
         // Every point at 90 %, every tenth at 80 %, and where a limit of 5 % has lights sorted.
         let errors_of = [&shown[1].rescaled[..], &shown[9].rescaled];
         context.picture(SHOWN, &panels(size, &all.plain, &errors_of, &shown[10].sorted));
-        let [potential, with_sorts] = [&times[RULES.len()], &times[RULES.len() + 1]];
+        let [potential, with_sorts, with_fifth] = [0, 1, 2].map(|part| &times[RULES.len() + part]);
         let less = |a: &Repeats, b: &Repeats| Repeats(a.0.iter().zip(&b.0).map(|(a, b)| a - b).collect());
         for (part, time, published) in [
             (VISIBILITY, less(&times[0], potential), 85.0),
             (POTENTIAL, potential.clone(), 15.0),
             (SORT, less(with_sorts, potential), 5.0),
+            (FIFTH_SORT, less(with_fifth, potential), 1.0),
         ] {
             found.parts.push(Part {
                 part: part.into(),
@@ -532,6 +566,22 @@ impl Study for Found {
                     |row| (row.lights, row.share.into()),
                 ),
             ))
-            .and(Findings::of(&self.parts, OF_PARTS))
+            .and(Findings::of(&self.ranks, &[]).long().curves(
+                "ranks",
+                "Potential of one point's lights by rank",
+                Axes::rates("rank", "potential over that of the strongest"),
+                curves(
+                    &self.ranks,
+                    |row| format!("{} walks", row.walks),
+                    |row| (row.rank as f64, row.potential.into()),
+                ),
+            ))
+            .and(Findings::of(&self.parts, OF_PARTS).bars(
+                "parts",
+                "Where time goes, all lights (%)",
+                &self.parts,
+                |row| ["all lights".into(), row.part.clone()],
+                |row| (&row.share).into(),
+            ))
     }
 }
