@@ -32,8 +32,8 @@ use glam::UVec4;
 
 /// Tells the numbers of chains from those of other samplers.
 const CHAIN_SEED: u32 = 0x6d65_7472;
-/// Tries anywhere: what they bring tells the power of the pool to a few hundredths.
-const SEEDS: u32 = 4096;
+/// Tries anywhere: what they bring tells the power of the pool to a few hundredths even where one in a hundred brings anything.
+const SEEDS: u32 = 16_384;
 /// Chains, of as many lights at least.
 const CHAINS_MAX: u32 = 64;
 /// Tries of a submission that measures lights.
