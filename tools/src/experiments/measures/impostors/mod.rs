@@ -12,5 +12,6 @@ pub mod impostor_methods;
 pub mod impostor_motion;
 pub mod impostor_occlusion;
 pub mod impostor_roots;
+pub mod published_lobe;
 pub mod search_times;
 pub mod virtual_images;
