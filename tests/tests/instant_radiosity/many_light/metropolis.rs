@@ -33,7 +33,7 @@ fn chosen_lights_bring_all_that_the_pool_brings() {
                 // Seeds; steps of four for a light, of four tries and three references; the pixels that measure lights.
                 let at_once = lights.min(64);
                 let steps = 4 * u64::from(lights.div_ceil(at_once) * at_once);
-                let rays = 4096 + 7 * steps + u64::from(lights * 4096);
+                let rays = 16_384 + 7 * steps + u64::from(lights * 4096);
                 assert_eq!(counts.chain_rays, rays);
                 let luminance = [0.2126, 0.7152, 0.0722];
                 (0..3)

@@ -173,6 +173,7 @@ impl Study for Found {
                 finest.map(|row| row.of_classical.into()),
             )
             .note("Spheres of radius 0.15 in the room [−1, 1]³ with a bright patch on its floor; lobes about the points' own normals. The map at its place is taken by all its texels, without a look-up's filter.")
+            .note("In the corner 4² texels a face are behind the map at its place, and 8² ahead of it: published of irradiance is that normals do not help so few texels there, which lose 42 % of the light since one sample of each is too coarse, and that 8² are the least with normals.")
             .curves(
                 "errors",
                 "Errors of glossy light by terms",
