@@ -57,8 +57,6 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
     ("twin_search.comp", "SpecConstantOp"),
     ("raster/omni_shadow_look_up.comp", "SpecConstantOp"),
     ("maps/gather.comp", "SpecConstantOp"),
-    ("maps/impostor_layouts.comp", "SpecConstantOp"),
-    ("maps/impostor_search.comp", "SpecConstantOp"),
     ("maps/directional_border.comp", "SpecConstantOp"),
     ("maps/directional_coarser.comp", "SpecConstantOp"),
     ("maps/directional_look_up.comp", "SpecConstantOp"),

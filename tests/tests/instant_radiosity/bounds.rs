@@ -140,13 +140,14 @@ fn loose_bounds_compensate_nothing_and_tight_ones_trace_paths() {
         expect_alike("tight", &tight, &direct);
         let settings = VirtualLightSettings {
             walks: 1,
-            samples_per_pass: 4,
+            // Of so many a pass's values are nearly normal, as the test of each pixel has it.
+            samples_per_pass: 16,
             bound: Bound::Geometry,
             bound_value: TIGHT,
             ..settings()
         };
         let found = passes(gpu, &scene, &settings, 48);
         found.expect_same_as("tight, compensated", &traced(gpu, &scene, 2048), 0.0);
-        assert!(found.counts.gather.gathers > 2 * u64::from(48 * 4 * SIDE * SIDE));
+        assert!(found.counts.gather.gathers > 2 * u64::from(48 * 16 * SIDE * SIDE));
     });
 }
