@@ -192,7 +192,7 @@ const bool compact_mine = true;
 // Records fetched, beside compact_counters.
 uint compact_records = 0u;
 
-// Within no box, nor any in it.
+// The empty span: of a box that a ray does not meet, and of all in it.
 const vec2 COMPACT_NO_SPAN = vec2(1.0, -1.0);
 
 // One loop, whose step is a node or a record, as in a point's query. With COMPACT_PACKET a ray that does not meet a box has no span there, and so meets nothing within; all

@@ -2,7 +2,7 @@
 #ifndef CLERESTORY_MAPS_GATHER_FEW_GLSL
 #define CLERESTORY_MAPS_GATHER_FEW_GLSL
 
-// Terms that few are.
+// How many terms are kept: GatherFew has a member for each.
 const uint GATHER_FEW = 5u;
 
 // Radiance and term of each, greatest first.

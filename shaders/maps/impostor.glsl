@@ -33,7 +33,7 @@ layout(constant_id = 131) const uint IMPOSTOR_STEPS = 3u;
 layout(constant_id = 132) const uint IMPOSTOR_BISECTIONS = 12u;
 // Layers of surfaces.
 layout(constant_id = 133) const uint IMPOSTOR_LAYERS = 1u;
-// Whether there is no surface somewhere; where there is one everywhere, nothing is asked of what a search found but its residual.
+// Whether some directions meet no surface. Where none does, the residual alone judges what a search found.
 layout(constant_id = 136) const bool IMPOSTOR_IS_OPEN = true;
 
 // What a search found: the direction from the map's place, the ray's length, |1 - g|, and the surface's layer.

@@ -11,9 +11,9 @@
 
 // Below this cosine of microfacet incidence the simplified term is cut off.
 const float SIMPLIFIED_COSINE_MIN = 1e-3;
-// From this 1 / (m tan) on Beckmann's microfacets hide nothing to speak of.
+// From this 1 / (m tan) on Beckmann's G1 is taken as 1 (Walter et al. 2007, equation 27).
 const float BECKMANN_UNMASKED_MIN = 1.6;
-// sqrt(pi) - 1: how much GGX masks at grazing incidence beyond Beckmann's distribution, over what that does.
+// sqrt(pi) - 1: Smith's Lambda of GGX over that of Beckmann's distribution at grazing incidence, less 1.
 const float GGX_EXCESS = 0.77245385;
 
 // Beckmann's density of microfacet normals, of slope m.

@@ -234,6 +234,9 @@ impl Caps {
         if let Some(bytes) = lesser.heap_bytes {
             self.device_heap = self.device_heap.min(bytes);
         }
+        if let Some(bytes) = lesser.max_storage_buffer_range {
+            self.max_storage_buffer_range = self.max_storage_buffer_range.min(bytes);
+        }
         if let Some(texels) = lesser.max_texel_buffer_elements {
             self.max_texel_buffer_elements = self.max_texel_buffer_elements.min(texels);
         }

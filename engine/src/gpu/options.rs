@@ -128,6 +128,8 @@ pub struct Lesser {
     pub max_workgroups: Option<[u32; 3]>,
     /// At most as many bytes in the device's heaps.
     pub heap_bytes: Option<u64>,
+    /// At most as many bytes of a storage buffer.
+    pub max_storage_buffer_range: Option<u64>,
     /// At most as many texels of a texel buffer.
     pub max_texel_buffer_elements: Option<u64>,
 }

@@ -246,7 +246,7 @@ mod tests {
     use crate::test_chi_square::{chi_square, chi_square_z};
     use crate::test_random::Random;
 
-    /// The standard normal variable that one in a hundred is above.
+    /// The 99th percentile of the standard normal distribution.
     const ONE_IN_A_HUNDRED: f64 = 2.326;
 
     /// The sum over a face of a cube in so many texels.

@@ -22,7 +22,7 @@ pub enum Geometry {
     CookTorrance,
     /// The term of one cosine by Kelemen and Szirmay-Kalos.
     Simplified,
-    /// Smith's term of the distribution, of both directions apart: G1 · G1, as Mitsuba has it.
+    /// The distribution's separable Smith term, G1(ωi) G1(ωo), as in Mitsuba.
     Smith,
 }
 

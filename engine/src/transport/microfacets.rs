@@ -28,9 +28,9 @@ use crate::gpu::shaders::constants;
 
 /// Below this cosine of microfacet incidence the simplified term is cut off.
 const SIMPLIFIED_COSINE_MIN: f64 = constants::SIMPLIFIED_COSINE_MIN as f64;
-/// From this 1/(m tan θ) on Beckmann's microfacets hide nothing to speak of.
+/// From this 1/(m tan θ) on Beckmann's G1 is taken as 1 (Walter et al. 2007, equation 27).
 const BECKMANN_UNMASKED_MIN: f64 = constants::BECKMANN_UNMASKED_MIN as f64;
-/// √π − 1: how much GGX masks at grazing incidence beyond Beckmann's distribution, over what that does.
+/// √π − 1: Smith's Λ of GGX over that of Beckmann's distribution at grazing incidence, less 1.
 const GGX_EXCESS: f64 = constants::GGX_EXCESS as f64;
 
 /// Beckmann's density of microfacet normals, of root mean square slope `m`/√2 along an axis, sr⁻¹.

@@ -43,6 +43,7 @@ layout(constant_id = 56) const bool PLANES = false;  // and planes
 layout(constant_id = 57) const bool POINTS = false;  // and collisions
 const bool WIDE = PLANES || POINTS;
 
+// Tells the words of the choice among planes from others.
 const uint PLANE_CHOICE_KEY = 0x10000000u;
 // Places of a march within a kernel, at most: it is twice as wide as they lie apart.
 const uint MARCH_PLACES = 3u;
@@ -268,7 +269,7 @@ void main() {
     if (!LINEAR || push.first == 0u) {
         atomicAdd(beam_counters.queries, 1u);
         if (COUNT_FETCHES && status.rounds > 0u) {
-            atomicAdd(beam_counters.later, 1u);
+            atomicAdd(beam_counters.later_queries, 1u);
         }
     }
     COUNT_WIDE(beam_counters.events, gathered_events)

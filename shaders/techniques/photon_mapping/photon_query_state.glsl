@@ -23,7 +23,7 @@ bool beam_has_stopped(uint resume) {
     return resume == BEAM_STOPPED || resume == BEAM_STOPPED_GATHER_DONE || resume == BEAM_STOPPED_GATHER_STOPPED;
 }
 bool gather_has_stopped(uint resume) { return resume == GATHER_STOPPED || resume == BEAM_STOPPED_GATHER_STOPPED; }
-// Whether the beam of a place has been asked for, whatever has become of it; and whether its way is known, or has none that asks.
+// Whether the beam of a place has been asked for, whatever has become of it; and whether its way is known, or nothing on it asks.
 bool beam_was_asked(uint resume) {
     return beam_is_known(resume) || beam_has_stopped(resume) || resume == GATHER_DONE || resume == GATHER_STOPPED || resume == BEAM_TRACING;
 }

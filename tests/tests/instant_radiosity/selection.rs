@@ -4,14 +4,15 @@ use super::*;
 use clerestory::Error;
 use clerestory::gpu::shaders::constants::LIGHT_NODE_LEAF;
 use clerestory::gpu::shaders::types::SceneLightNode;
+use clerestory::gpu::{GpuOptions, Lesser};
 use clerestory::techniques::instant_radiosity::Selection;
 use clerestory::techniques::instant_radiosity::selection::{LitPoint, SurfaceLight, potential_contribution};
 use clerestory::transport::edge_bound::EdgeBound;
 use clerestory::transport::light_tree::light_node_union;
 use clerestory_hard_cases::scenes::orthographic;
 use clerestory_tests::child::{hash_in_child, print_hash};
-use clerestory_tests::gpu;
 use clerestory_tests::render::floor;
+use clerestory_tests::{assert_no_messages, gpu, gpu_with};
 use glam::DVec3;
 
 /// Set in the processes that only print their picture's hash.
@@ -511,31 +512,42 @@ fn selections_out_of_range_are_refused_by_name() {
     });
 }
 
-/// Of more than a million lights the nodes fill no buffer of 128 MiB.
+/// A tree whose nodes do not fit in a storage buffer is refused with its size.
 #[test]
 fn trees_beyond_a_buffer_are_refused_with_their_size() {
-    with_gpu(|gpu| {
-        let most = gpu.caps().max_storage_buffer_range;
-        if most > 1 << 27 {
-            println!("skipped: the device's buffers hold {most} bytes");
-            return;
-        }
-        let many = VirtualLightSettings {
-            walks: 1 << 20,
-            ..cuts(4)
-        };
-        let mut renderer = renderer(gpu, &room(), [1, 1], &many);
-        let error = loop {
-            match renderer.step(1) {
-                Ok(Some(_)) => {}
-                Ok(None) => panic!("must be refused"),
-                Err(error) => break error,
-            }
-        };
-        let text = error.to_string();
-        let Error::Overflow { needed, capacity, .. } = error else {
-            panic!("{text}");
-        };
-        assert!(needed > capacity && text.contains("walks"), "{text}");
+    // Of walks whose lights fit, and whose tree, of up to three nodes a light, does not.
+    const RANGE: u64 = 1 << 20;
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            max_storage_buffer_range: Some(RANGE),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
     });
+    let many = VirtualLightSettings {
+        walks: 10_000,
+        most_bounces: 2,
+        ..cuts(4)
+    };
+    let mut renderer = renderer(&gpu, &room(), [1, 1], &many);
+    let error = loop {
+        match renderer.step(1) {
+            Ok(Some(_)) => {}
+            Ok(None) => panic!("must be refused"),
+            Err(error) => break error,
+        }
+    };
+    let text = error.to_string();
+    let Error::Overflow {
+        kernel,
+        needed,
+        capacity,
+        ..
+    } = error
+    else {
+        panic!("{text}");
+    };
+    assert_eq!((kernel.as_str(), capacity), ("cut_level", RANGE / 64));
+    assert!(needed > capacity && text.contains("walks"), "{text}");
+    assert_no_messages(&gpu);
 }

@@ -251,7 +251,7 @@ fn sparse() -> Scene {
     scene
 }
 
-// A way through the grid takes more tentative collisions than a dispatch has, and goes on in the next one, before it asks.
+/// A way through the grid takes more tentative collisions than a dispatch has, and goes on in the next one, before it asks.
 #[test]
 fn queues_and_packets_wait_for_walks_through_grids() {
     with_gpu(|gpu| {
@@ -265,7 +265,7 @@ fn queues_and_packets_wait_for_walks_through_grids() {
     });
 }
 
-// Nor does it show where submissions end, with which places that wait in a queue are asked for in the next one, without their ways being found again.
+/// Pictures are the same wherever submissions end, with which places that wait in a queue are asked for in the next one, without their ways being found again.
 #[test]
 fn queues_and_packets_are_the_same_in_parts() {
     with_gpu(|gpu| {

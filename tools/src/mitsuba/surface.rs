@@ -124,7 +124,7 @@ fn distribution(microfacets: Option<Microfacets>) -> Result<&'static str, String
     };
     if geometry != Geometry::Smith {
         return Err(
-            "classical microfacets that grooves or a term of one cosine mask have no counterpart, in Mitsuba Smith's term does"
+            "classical microfacets have no counterpart under Cook and Torrance's or the simplified term: Mitsuba masks by Smith's term"
                 .into(),
         );
     }

@@ -40,7 +40,7 @@ pub fn refit(index: &WideBvh, triangles: &[[Vec3; 3]]) -> Result<WideBvh> {
     Ok(WideBvh::assembled(&nodes, &moved, &bounds, statistics, stages))
 }
 
-/// A tree in the device's memory, of those statistics, refitted there: it is brought to the host and back.
+/// Refits a tree in the device's memory, whose statistics these are; the host does it, so the tree is read back and uploaded.
 ///
 /// # Errors
 /// As [`refit`]; [`Error::DeviceLost`](crate::Error::DeviceLost), [`Error::OutOfMemory`](crate::Error::OutOfMemory).

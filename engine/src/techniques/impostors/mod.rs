@@ -15,8 +15,8 @@
 //! Bias, all of it:
 //!
 //! - What the map's place does not see is not there: reflections stick to the edges of what hides it. With further layers of surfaces, which a map by rays has, that is what lies behind more surfaces than these.
-//!   A mirror sphere that touches a wall is 0.5 % RMS off, with a radius of 0.3 of the room's half width and a map at its middle. A thin wall close to the map's place is nearly all that the map has of its side: with a screen of a fifth of the room's width
-//!   a hundredth before the place, the sphere behind it is 150 % RMS off, a second layer leaves 25 %, and the sphere's own middle as the place 3 %.
+//!   A mirror sphere that touches a wall is 0.5 % RMS off, with a radius of 0.3 of the room's half width and a map at its middle. Behind a screen a fifth of the room's width across, a hundredth of its half width before the map's place,
+//!   a sphere is 150 % RMS off; a second layer leaves 25 %, the sphere's own middle as the place 3 %.
 //! - Radiance is that towards the map's place, not towards the surface; among diffuse surfaces they are the same. In a room whose walls reflect 70 % by Phong lobes of exponent 10, a mirror sphere half-way to a wall is 58 % RMS off with a radius of 0.3 of the room's half width, and 19 % with 0.1.
 //! - Searches end beside surfaces: by how much, [`ImpostorReflections::counts`] and [`LookUp::residual`] say.
 //! - Radiance at texels' middles is joined bilinearly, so that borders of shadows are up to half a texel off; with a capture by rays its noise stays, and is the same for all seeds.

@@ -234,7 +234,7 @@ impl LocalizedGather {
         if self.settings.form != GatherForm::DiscWithNormals {
             all.push(Skipped {
                 what: "normals",
-                why: "the form of solid angles takes none",
+                why: "this form of the solid angle needs none",
             });
         }
         all

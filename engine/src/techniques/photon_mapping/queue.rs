@@ -25,7 +25,7 @@ type Head = photon_queue_blocks::GatherQueueHead;
 pub(super) struct AskSpec {
     pub has_path_automaton: bool,
     pub counts_bounces: bool,
-    /// It is the rays that ask, as the stage before has found out.
+    /// Whether rays through media ask, as photon_beam_ways.comp marked them, instead of points.
     pub of_rays: bool,
 }
 

@@ -69,7 +69,7 @@ pub const BSDF_BECKMANN: u32 = constants::BSDF_BECKMANN;
 pub const BSDF_COSINE_LOBE: u32 = constants::BSDF_COSINE_LOBE;
 /// The simplified geometric term in place of Cook and Torrance's.
 pub const BSDF_SIMPLIFIED_G: u32 = constants::BSDF_SIMPLIFIED_G;
-/// Smith's term of both directions apart in place of it.
+/// Smith's separable term in place of it.
 pub const BSDF_SMITH_G: u32 = constants::BSDF_SMITH_G;
 /// ωo is where particles come from: refraction is not scaled by 1/η².
 pub const BSDF_IMPORTANCE: u32 = constants::BSDF_IMPORTANCE;

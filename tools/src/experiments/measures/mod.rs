@@ -228,7 +228,7 @@ mod tests {
 
     /// Criteria for rows that no smoke run has, since they take too long.
     const OF_LONG_RUNS: [&str; 22] = [
-        "the gather is linear in its lights: time of one of 1024 over that of one of 256",
+        "the gather is linear in its lights: time per light with 1024 over that with 256",
         "by the published lobe RMS errors are the published ones, exponent 50: relative difference (%)",
         "pilots take at most a quarter of the time of each picture where it is above five seconds: the largest share",
         "95 of 100 footprints of 256 pixels a side are within 5 %: their relative error",

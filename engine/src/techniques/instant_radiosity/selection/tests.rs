@@ -219,7 +219,7 @@ fn a_share_of_the_potential_needs_the_published_share_of_lights_and_rays() {
     within("lights", sums[11], [105.0, 134.0]);
 }
 
-/// Where a bound ends corners hardly matters to which lights are strong.
+/// Which lights are strong hardly depends on the bound.
 #[test]
 fn shares_of_lights_hardly_depend_on_the_bound() {
     let scene = UnitBox::new();
@@ -239,7 +239,6 @@ fn shares_of_lights_hardly_depend_on_the_bound() {
         }
         [ninety, eighty].map(|taken| taken / (points.len() * lights.len()) as f64)
     });
-    println!("{shares:?}");
     for other in [shares[0], shares[2]] {
         for (other, tenth) in other.iter().zip(shares[1]) {
             assert!((other - tenth).abs() < 0.01, "{shares:?}");

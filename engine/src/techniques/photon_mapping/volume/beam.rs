@@ -41,7 +41,7 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     query: Query,
     queue: Queue,
     /// Finds the ways before the queue is filled; without one queries do.
-    finds: Option<ComputePipeline<photon_beam_ways::Kernel>>,
+    way_finder: Option<ComputePipeline<photon_beam_ways::Kernel>>,
     /// For places that a quota stopped: made when it is first needed.
     linear: (Box<photon_beam::Spec>, OnceLock<ComputePipeline<photon_beam::Kernel>>),
     ways: Buffer,
@@ -136,7 +136,7 @@ impl Beam {
             MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_beam, queue.kind(), false))?),
             MapQuery::Packet => Query::Packet(gpu.compute_pipeline(&spec!(photon_beam_packet, queue.kind(), false))?),
         };
-        let finds = photon_beam_ways::Spec {
+        let way_finder = photon_beam_ways::Spec {
             has_absorption: profile.has_absorption,
             has_instances: profile.keeps_instances,
             has_path_automaton: eye.has_automaton(),
@@ -163,9 +163,9 @@ impl Beam {
         Ok(Self {
             gpu: gpu.clone(),
             query,
-            finds: queue
+            way_finder: queue
                 .collects()
-                .then(|| gpu.compute_pipeline::<photon_beam_ways::Kernel>(&finds))
+                .then(|| gpu.compute_pipeline::<photon_beam_ways::Kernel>(&way_finder))
                 .transpose()?,
             queue,
             linear: (Box::new(spec!(photon_beam, QUEUE_SLOTS, true)), OnceLock::new()),
@@ -189,7 +189,7 @@ impl Beam {
     }
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
-        let mut all: Vec<PipelineInfo> = self.finds.iter().map(ComputePipeline::info).collect();
+        let mut all: Vec<PipelineInfo> = self.way_finder.iter().map(ComputePipeline::info).collect();
         all.extend(self.queue.pipelines());
         all.push(match &self.query {
             Query::Single(kernel) => kernel.info(),
@@ -218,7 +218,7 @@ impl Beam {
     pub fn fetches(&self) -> Result<RayFetches> {
         let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
         Ok(RayFetches {
-            later_queries: u64::from(counters.later),
+            later_queries: u64::from(counters.later_queries),
             nodes: wide_counter(counters.nodes),
             records: wide_counter(counters.records),
             tests: wide_counter(counters.tests),
@@ -289,9 +289,9 @@ impl BeamStage<'_> {
         let (sets, push): ([&dyn BindingSet<'_>; 4], _) =
             ([wave, &set, &of_scene, &media], self.push(scene, places.key));
         let mut groups = places.items;
-        if let Some(finds) = &self.beam.finds {
+        if let Some(way_finder) = &self.beam.way_finder {
             recorder.pass("photon: beam ways", |pass| {
-                pass.dispatch_indirect(finds, &sets, &bytemuck::cast(push), places.items)?;
+                pass.dispatch_indirect(way_finder, &sets, &bytemuck::cast(push), places.items)?;
                 stage_barrier(pass);
                 Ok(())
             })?;

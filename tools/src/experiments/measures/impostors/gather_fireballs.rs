@@ -79,7 +79,7 @@ pub const OF_PARTS: &[Criterion<Part>] = &[
     .among(|row| row.is_end() && row.way == CLASSICAL)
     .because("it knows no place"),
     Criterion::each(
-        "by eight texels a side they are not: light over that in the middle",
+        "by eight texels a side head and base are not lit as the middle is: light over that in the middle",
         Bound::AtMost(0.5),
         |row: &Part| row.of_middle.into(),
     )

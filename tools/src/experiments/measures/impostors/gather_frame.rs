@@ -69,7 +69,7 @@ const CRITERIA: &[Criterion<Row>] = &[
     )
     .in_every_form(),
     Criterion::each(
-        "the gather is linear in its lights: time of one of 1024 over that of one of 256",
+        "the gather is linear in its lights: time per light with 1024 over that with 256",
         Bound::Between(0.9, 1.1),
         |row: &Row| {
             row.of_light

@@ -19,7 +19,7 @@ const JUDGED: u32 = 10;
 /// Frames whose pictures are compared with the path tracer's: the last ones before a map is drawn.
 const TRACED: [u32; 3] = [9, 29, 59];
 const TURNS: usize = 5;
-/// The map is the octahedron whose number of texels is nearest to six times 256².
+/// The map is an octahedron whose side, a power of two, is nearest to the root of six times 256².
 const FULL: Quality = Quality {
     frames: 60,
     size: 192,
@@ -83,12 +83,12 @@ const CLASSICAL: &str = "in the ray's own direction";
 const SEARCHED: &str = "searched, hybrid +3";
 
 const OF_TRACES: &[Criterion<Trace>] = &[Criterion::each(
-    "a map at each tenth frame takes a tenth of one at each: drawing maps, over that at each frame",
+    "a map every tenth frame takes a tenth of one every frame: time of drawing maps over that",
     Bound::AtMost(0.15),
     |row: &Trace| (&row.of_every).into(),
 )
 .among(|row| row.period == u64::from(JUDGED))
-.because("a tenth, and half of that for frames that differ; a map each 150 ms was published to cost next to nothing")];
+.because("a tenth, and half of that for frames that differ; a map every 150 ms was published to cost next to nothing")];
 const OF_PICTURES: &[Criterion<Stale>] = &[
     Criterion::each(
         "pictures searched in old maps are nearer to those by fresh ones than classical look-ups are: RMS over theirs",
@@ -97,7 +97,7 @@ const OF_PICTURES: &[Criterion<Stale>] = &[
     )
     .among(|row| row.way == SEARCHED && row.period > 1),
     Criterion::each(
-        "and they change less when a map is drawn: largest change over theirs",
+        "pictures searched in old maps change less when a map is drawn than classical look-ups do: largest change over theirs",
         Bound::AtMost(1.0),
         |row: &Stale| row.jump_of_classical.unwrap_or(f64::NAN).into(),
     )
@@ -128,7 +128,7 @@ fn pictures(context: &Context<'_>, game: &mut Game<'_>, frames: u32, periods: &[
         .collect();
     context.each(
         &cases,
-        |(searches, period)| format!("a map each {period}, {}", if *searches { SEARCHED } else { CLASSICAL }),
+        |(searches, period)| format!("a map every {period} frames, {}", if *searches { SEARCHED } else { CLASSICAL }),
         |(searches, period)| {
             let (mut sum, mut most, mut jump, mut rays) = (0.0, 0.0_f64, 0.0_f64, 0.0);
             let mut before: Option<Deviation> = None;
@@ -233,7 +233,7 @@ impl Study for Found {
                 Axes::even("frame", "time (ms)", 1.05 * most, (6, 10.0)),
                 curves(
                     &self.moments,
-                    |row| format!("a map each {}", row.period),
+                    |row| format!("a map every {} frames", row.period),
                     |row| (row.frame as f64, row.time.into()),
                 ),
             )

@@ -301,7 +301,7 @@ pub(super) fn findings(rows: &[Frame]) -> Findings {
     let there = ROOMS.iter().filter(|room| rows.iter().any(|row| row.room == room.name));
     there.fold(found, |found, room| {
         let words = format!(
-            "A mirror sphere in a room ({}), from above at the begin, the middle and the end of its way; from the left the path tracer, the classical look-up, one step, and one and eight steps of \
+            "A mirror sphere in a room ({}), from top to bottom at the beginning, the middle and the end of its way; from the left the path tracer, the classical look-up, one step, and one and eight steps of \
              false position",
             room.name
         );

@@ -24,7 +24,7 @@ use crate::experiments::measures::errors::mean_with_error;
 
 /// Pixels, all of which see the same ray.
 const SIZE: [u32; 2] = [2, 2];
-/// Passes, whose spread is that of their mean, and what photons are divided by: in full, and in a smoke run.
+/// Passes, whose spread gives the standard error of their mean, and the divisor of their photons: in full, and in a smoke run.
 const FULL: (u32, u32) = (24, 1);
 const SMOKE: (u32, u32) = (4, 32);
 /// Constants of a smoke run.
@@ -52,7 +52,7 @@ const CONSTANTS: [(f32, f32, f64); 6] = [
 
 const DISKS: &str = "beam estimate";
 const BALLS: &str = "marched estimate";
-const WAYS: &str = "photon beams";
+const BEAMS: &str = "photon beams";
 
 /// An estimate, the radius of its kernels, m, and its photons in a pass.
 struct Estimate {
@@ -62,7 +62,7 @@ struct Estimate {
     photons: u32,
 }
 
-/// Ways are met by many more rays than collisions, so that fewer and narrower ones do.
+/// A ray meets a beam far more often than a collision, so fewer and narrower beams do.
 const ESTIMATES: [Estimate; 3] = [
     Estimate {
         name: DISKS,
@@ -77,7 +77,7 @@ const ESTIMATES: [Estimate; 3] = [
         photons: 1 << 20,
     },
     Estimate {
-        name: WAYS,
+        name: BEAMS,
         volume: VolumeEstimate::Beams,
         radius: 0.02,
         photons: 1 << 16,
@@ -90,7 +90,7 @@ rows! {
         estimate: String = "estimate",
         k: f64 = "k",
         place: f64 = "light's place along the ray (m)",
-        lengths: f64 = "lengths times",
+        lengths: f64 = "lengths multiplied by",
         photons: u64 = "photons",
         kernels: u64 = "kernels that the ray met",
         closed_form: f64 = "closed form",
@@ -132,10 +132,10 @@ const CRITERIA: &[Criterion<Row>] = &[
         row.off.abs().into()
     })
     .among(|row| row.estimate == BALLS),
-    Criterion::each("ways have the closed form: standard errors off", THREE, |row: &Row| {
+    Criterion::each("beams have the closed form: standard errors off", THREE, |row: &Row| {
         row.off.abs().into()
     })
-    .among(|row| row.estimate == WAYS),
+    .among(|row| row.estimate == BEAMS),
     Criterion::each(
         "a mirrored phase function fails: standard errors off",
         Bound::AtLeast(3.0),

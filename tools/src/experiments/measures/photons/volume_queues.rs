@@ -147,7 +147,7 @@ rows! {
         scene: String = "scene",
         form: String = "form",
         time: Repeats = "queries with their queue (ms)",
-        collecting: Repeats = "of it ways and queue (ms)",
+        collecting: Repeats = "ways and queue, part of it (ms)",
         over_first: Repeats = "over type I by itself (%)",
         over_compacted: Option<Repeats> = "type III over type II (%)",
         nodes: f64 = "nodes fetched per ray",
@@ -178,9 +178,9 @@ rows! {
         scene: String = "scene",
         stage: String = "stage",
         jobs: Option<f64> = "jobs per frame",
-        later_jobs: Option<f64> = "of them behind the first bounce",
+        later_jobs: Option<f64> = "of them after the first bounce",
         first: Repeats = "first bounce (ms)",
-        later: Repeats = "behind it (ms)",
+        later: Repeats = "after it (ms)",
         share: Repeats = "share of the frame (%)",
     }
 }
@@ -202,7 +202,7 @@ const OF_SCENES: &[Criterion<Seen>] = &[
     )
     .in_every_form(),
     Criterion::each(
-        "contributions a second along rays over those on surfaces in the same frames",
+        "rays give at least half as many contributions a second as surfaces in the same frames: ratio",
         Bound::AtLeast(0.5),
         |row: &Seen| (&row.ratio).into(),
     ),
@@ -235,7 +235,7 @@ const OF_FORMS: &[Criterion<Row>] = &[
     .because("the source's mean over nine scenes, from its rows"),
 ];
 const OF_CHANGES: &[Criterion<Change>] = &[Criterion::all(
-    "time follows what is executed rather than bytes: mean distance of its change from that of tests, over that from that of bytes",
+    "time follows tests rather than bytes: how far its change is from that of tests, over how far from that of bytes",
     Bound::AtMost(1.0),
     |rows: &[&Change]| {
         let distance = |of: fn(&Change) -> f64| -> f64 {
@@ -303,7 +303,7 @@ struct Taken {
     bytes: f64,
 }
 
-/// Bytes of a node of the map, half a pair, and of a record.
+/// Bytes of a node of the map, half a pair, and of a record without planes or collisions.
 const NODE_BYTES: f64 = 16.0;
 const RECORD_BYTES: f64 = 32.0;
 /// Bytes of a way that a queue hands on, written and read, and of its place.

@@ -118,8 +118,8 @@ impl Study for Found {
             .note(
                 "The mean squared error falls as the number of samples grows, so that its product with the time is the time to equal error. Pictures in turns, a \
                  seed for each turn; the relative MSE is that of `clerestory compare`. By power the rare samples that find the lamp in view carry most of the \
-                 error, so that few pictures show less of it than there is. Between walls the tree takes lamps for near that no place sees: it knows distances and \
-                 cones, and nothing of what stands between, so that some of its shadow rays are lost, as none of one lamp's are.",
+                 error, so that few pictures show less of it than there is. Between walls the tree favours near lamps that walls hide: it knows distances and \
+                 cones, and nothing of what stands between. It loses shadow rays on them; a single lamp loses none.",
             )
             .bars(
                 "cost",

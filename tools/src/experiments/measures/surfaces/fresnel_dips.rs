@@ -139,7 +139,7 @@ const OF_DIPS: &[Criterion<Dip>] = &[
     .because("it is printed to four digits")
     .in_every_form(),
     Criterion::each(
-        "it is at the published cosine: their difference",
+        "the least reflectance at n = 1.5 is at the published cosine: their difference",
         Bound::AtMost(5e-4),
         |row: &Dip| (row.place - row.published_place).abs().into(),
     )

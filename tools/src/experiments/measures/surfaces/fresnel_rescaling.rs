@@ -151,7 +151,7 @@ const OF_TERMS: &[Criterion<Term>] = &[
     )
     .in_every_form(),
     Criterion::each(
-        "it takes most off where its derivative is zero: difference of the cosine",
+        "a term takes most off where its derivative is zero: difference of the cosine",
         Bound::AtMost(1e-4),
         |row: &Term| (row.place - row.closed).abs().into(),
     )

@@ -13,7 +13,7 @@ use clerestory::transport::fresnel::curve::FresnelCurve;
 use clerestory::transport::fresnel::extinction::{wave_envelope, wave_field};
 use glam::DVec3;
 
-use super::spectral_ways::{ASPECT, Way, bins_name, spectrum_of};
+use super::spectral_ways::{ASPECT, GREY, Way, bins_name, spectrum_of};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Repeats, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
 use crate::metal_forms::sheet;
@@ -30,8 +30,6 @@ const METALS: [&str; 9] = [
     "nickel",
     "cobalt",
 ];
-/// A metal of one index at all wavelengths.
-const GREY: &str = "grey";
 /// Bins of the oracle.
 const ORACLE: u32 = 41;
 /// Evaluations of an invocation whose time is taken.

@@ -22,9 +22,11 @@ const DISTRIBUTIONS: [(&str, Distribution); 3] = [
     ("beckmann", Distribution::Beckmann),
     ("cosine-lobe", Distribution::CosineLobe),
 ];
+/// The term that is never above Cook and Torrance's.
+const SIMPLIFIED: &str = "simplified";
 const TERMS: [(&str, Geometry); 3] = [
     ("cook-torrance", Geometry::CookTorrance),
-    ("simplified", Geometry::Simplified),
+    (SIMPLIFIED, Geometry::Simplified),
     ("smith", Geometry::Smith),
 ];
 
@@ -58,7 +60,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         Bound::AtMost(1.0 + 1e-9),
         |row: &Row| row.over_grooves.into(),
     )
-    .among(|row| row.term == TERMS[1].0)
+    .among(|row| row.term == SIMPLIFIED)
     .because("(n·l)(n·v)/(l·h)² is at most (n·h)², and what is masked at most the greater cosine over the sum of both")
     .in_every_form(),
     Criterion::each(
@@ -148,7 +150,7 @@ impl Study for Found {
         Findings::of(self, CRITERIA)
             .headline(
                 "the greatest albedo with the simplified term",
-                largest(self, |row| row.term == TERMS[1].0, |row| row.greatest),
+                largest(self, |row| row.term == SIMPLIFIED, |row| row.greatest),
             )
             .note(
                 "Width α is the roughness squared: Beckmann's slope, and the lobe of exponent 2/α² − 2. Without compensation for multiple scattering, which \

@@ -22,6 +22,8 @@ const WAVELENGTHS: [f64; 3] = [700.0, 550.0, 435.0];
 const FACETS: u32 = 64;
 /// How far from the middle the half pipe of radius 1 is seen: beyond, light is reflected very often.
 const SEEN: f32 = 0.95;
+/// A metal of one index at all wavelengths.
+pub const GREY: &str = "grey";
 /// Width over height of pictures.
 pub const ASPECT: u32 = 16;
 /// Places across a pixel over which the table's part of it is averaged.
@@ -121,16 +123,16 @@ pub fn bins_name(count: u32) -> String {
     format!("{count} bins")
 }
 
-/// The spectrum of a metal; grey for a name that is none.
+/// The spectrum of a metal, or of [`GREY`].
 ///
 /// # Errors
-/// [`clerestory::Error::Setting`] if grey were no spectrum.
+/// [`clerestory::Error::Setting`] for an unknown metal.
 pub fn spectrum_of(metal: &str) -> Result<IndexSpectrum> {
-    let grey = || IndexSpectrum::parse("380 1.4 6.2\n780 1.4 6.2");
-    metals::spectrum(metal).map_or_else(
-        || grey().map_err(|cause| clerestory::Error::setting("metal", metal, cause)),
-        Ok,
-    )
+    let refused = |cause: String| clerestory::Error::setting("metal", metal, cause);
+    if metal == GREY {
+        return IndexSpectrum::parse("380 1.4 6.2\n780 1.4 6.2").map_err(|cause| refused(cause.to_string()));
+    }
+    metals::spectrum(metal).ok_or_else(|| refused("is none that is known".into()))
 }
 
 /// The index that an artist would have described by two colours, which hold no more than single precision.

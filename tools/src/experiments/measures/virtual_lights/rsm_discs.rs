@@ -130,7 +130,7 @@ fn rendering(
         path_set: INDIRECT.parse()?,
         ..ManyLightSettings::default()
     };
-    let camera = &scene.cameras[0];
+    let camera = scene.require_camera(None)?;
     ManyLight::new(gpu, Arc::clone(on_device), camera, [form.side; 2], settings)
 }
 

@@ -79,11 +79,11 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.lost.into(),
     )
     .among(|row| row.distance == TWENTIETH),
-    Criterion::each("a tenth loses 0.7 to 3 %", Bound::Between(0.7, 3.0), |row: &Row| {
+    Criterion::each("a tenth of the box loses 0.7 to 3 % of the light", Bound::Between(0.7, 3.0), |row: &Row| {
         row.lost.into()
     })
     .among(|row| row.distance == TENTH),
-    Criterion::each("a fifth loses 2.2 to 5.4 %", Bound::Between(2.2, 5.4), |row: &Row| {
+    Criterion::each("a fifth of the box loses 2.2 to 5.4 % of the light", Bound::Between(2.2, 5.4), |row: &Row| {
         row.lost.into()
     })
     .among(|row| row.distance == FIFTH),
