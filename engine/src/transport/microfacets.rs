@@ -179,7 +179,7 @@ mod tests {
     use crate::scene::Geometry;
 
     const SLOPES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 1.0];
-    const EXPONENTS: [f64; 4] = [5.0, 10.0, 50.0, 200.0];
+    const EXPONENTS: [f64; 7] = [0.5, 1.5, 3.0, 5.0, 10.0, 50.0, 200.0];
     const TERMS: [Geometry; 3] = [Geometry::CookTorrance, Geometry::Simplified, Geometry::Smith];
 
     type OfDirection = Box<dyn Fn(DVec3) -> f64>;

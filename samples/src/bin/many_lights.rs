@@ -323,14 +323,19 @@ impl Show for ManyLights {
             Shows::Normals => "normals",
             Shows::Direct => "direct light",
             Shows::Merged => "indirect light before the filter",
-            Shows::Filtered => "indirect light behind the filter",
+            Shows::Filtered => "indirect light after the filter",
         };
         format!(
             "{shown}: {} lights, visibility {:?}, bound {:?}, filter {}, history {}, {:.1} frames/s",
             s.lights,
             s.visibility,
             s.bound,
-            if s.filter { "on" } else { "off" },
+            match self.shows {
+                Shows::Merged => "off",
+                Shows::Filtered => "on",
+                _ if s.filter => "on",
+                _ => "off",
+            },
             if s.history > 0.0 { "on" } else { "off" },
             f64::from(frames) / seconds,
         )

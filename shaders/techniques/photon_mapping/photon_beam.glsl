@@ -12,7 +12,8 @@
 // With a queue (QUEUE) photon_beam_ways.comp has been to all places, and an invocation takes one of those that ask; without one an invocation per place first finds its way
 // (photon_beam_way.glsl). With COMPACT_PACKET defined the rays of a subgroup go through the map together, wherever any of them goes. A ray's sum has the order of the map's
 // leaves in each of these forms, and so the same bits; or the order of its records: a query that its quota stops leaves nothing and goes through all of them
-// instead (LINEAR). Rays together meet it sooner.
+// instead (LINEAR). Rays together meet it sooner, by the steps of all: where also the submission's work is
+// used up, who is with a ray decides whether it stops, and last bits with it.
 //
 // PM-VOL-5, PM-VOL-7, PM-ST-2 to PM-ST-6: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, 3.4.2.4, 7.1 and 7.4; W. Jarosz, M. Zwicker and H. W. Jensen, "The Beam Radiance Estimate
 // for Volumetric Photon Mapping", 2008; W. Jarosz, D. Nowrouzezahrai, I. Sadeghi and H. W. Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon

@@ -21,7 +21,7 @@ layout(set = 1, binding = 3, scalar) restrict buffer BeamCounters {
     uint queries;
     uint events[2];   // kernels that a ray pierced: 64 bits, the low word first
     // Where COUNT_FETCHES says so, also:
-    uint later_queries;  // of rays after the first bounce
+    uint later_queries;  // of rays after the first one of a path
     uint nodes[2];    // of the tree, fetched once for all rays that go through it together
     uint records[2];  // likewise
     uint tests[2];    // pairs of nodes, and records, that each ray has gone through

@@ -4,8 +4,8 @@
 // QUEUE_BLOCKS: teams as wide as subgroups collect places in shared memory and append whole blocks of as many to a list. A block number is all that
 // a consumer needs, so that consumers take the blocks of their own numbers instead of drawing tickets.
 //
-// PM-ST-2 to PM-ST-4: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §7.4.1. The order of blocks may differ from run to run, what is in a block
-// does not; each place's sum is its own.
+// PM-ST-2 to PM-ST-4: B. Fabianowski, "Interactive Manycore Photon Mapping", 2011, §7.4.1. The order of blocks may differ from run to run, and which places a wave whose
+// work is used up has left; each place's sum is its own.
 #ifndef CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_QUEUE_GLSL
 #define CLERESTORY_TECHNIQUES_PHOTON_MAPPING_PHOTON_QUEUE_GLSL
 

@@ -1,7 +1,8 @@
 #version 460
 // The queue of queries in blocks: teams, as many invocations as a block has places, walk COMPACT_CHUNK places each, collect those that ask a photon
 // map in shared memory and append them to the list of blocks whenever less than a block of room is left; at its end the last block of a team may be
-// partial. No workgroup waits for another. What is in a block follows from the places alone, its number from who came first.
+// partial. No workgroup waits for another. What is in a block follows from the places that ask, its number from who came first; which places ask of a
+// wave whose work is used up may differ.
 //
 // Teams are as wide as subgroups, but exchange data by shared memory and barriers, which the whole workgroup reaches: whether a place asks is known
 // only after divergent branches, and SPIR-V does not promise that a subgroup has reconverged behind them.

@@ -92,8 +92,9 @@ const REFUSED_BY_NAGA: &[(&str, &str)] = &[
 /// The whole workgroup reaches each of these operations: divergent branches end before it, and the loops and early returns around it are uniform. SPIR-V 1.3
 /// (its definition of uniform control flow) promises that lanes have reconverged there.
 const BY_WHOLE_WORKGROUPS: &str = "the whole workgroup comes to it";
-/// By these votes lanes wait for each other, or go where another lane must go; what each lane finds is its own, whichever other lanes vote with it.
-const WITH_ANY_COMPANY: &str = "no result depends on who votes";
+/// By these votes lanes wait for each other, or go where another lane must go; what each lane finds is its own, whichever other lanes vote with it, but for queries that a quota
+/// stops: the order of their sums is another.
+const WITH_ANY_COMPANY: &str = "no result depends on who votes, but for the last bits of queries that a quota stops";
 
 /// Modules with subgroup operations, each with why its results do not depend on lanes coming together again where SPIR-V does not promise it.
 const WITH_SUBGROUP_OPERATIONS: &[(&str, &str)] = &[

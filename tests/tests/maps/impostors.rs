@@ -450,6 +450,21 @@ fn what_cannot_be_searched_is_refused_by_name() {
             search.record(pass, &layered, buffer.slice(0, 128), buffer.slice(128, 128), 1)
         });
         assert!(refused.unwrap_err().to_string().contains("differs in map"));
+        // One for maps with a surface everywhere sees none of the sky; one for others searches these, too.
+        let open = ImpostorImage::from_fn(Parametrization::Cube, UVec2::splat(8), 1, false, |d| {
+            if d.y > 0.5 {
+                Vec::new()
+            } else {
+                BoxRoom::EMPTY.surfaces(d)
+            }
+        });
+        let open = Impostor::new(gpu, &open.unwrap()).unwrap();
+        assert!(open.is_open() && !impostor.is_open());
+        let refused = search.search_timed(&open, &[good]).unwrap_err().to_string();
+        assert!(refused.contains("places without a surface"), "{refused}");
+        let of_open = ImpostorSearch::new(gpu, &open, &settings).unwrap();
+        let (found, _) = of_open.search_timed(&impostor, &[good]).unwrap();
+        assert_eq!(found, impostor.search(&[good], &settings).unwrap());
     });
 }
 

@@ -196,9 +196,13 @@ impl ImpostorImage {
         [self.nearest, self.farthest]
     }
 
-    /// Whether some texel of some layer has [`NOTHING`](Self::NOTHING).
+    /// Whether some direction may have [`NOTHING`](Self::NOTHING): a texel of some layer, or what its plane comes to within it.
     pub fn is_open(&self) -> bool {
-        self.distances.iter().any(|distance| *distance >= Self::NOTHING)
+        let farthest = match self.normals {
+            Some(_) => Self::NOTHING / IMPOSTOR_PLANE_BOUND,
+            None => Self::NOTHING,
+        };
+        self.distances.iter().any(|distance| *distance >= farthest)
     }
 
     /// Distance to the surface of a layer in a direction of any length but 0: twin of `impostor_distance` of `maps/impostor_set.glsl`.

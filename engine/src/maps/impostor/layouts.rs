@@ -40,7 +40,8 @@ impl ImpostorLayouts {
     /// Uploads radiance and distances of the same map.
     ///
     /// # Errors
-    /// [`Error::Setting`] for maps that differ, and for impostors of several layers or with normals; [`Error::OutOfMemory`], [`Error::DeviceLost`].
+    /// [`Error::Setting`] for maps that differ, and for impostors of several layers or with normals; [`Error::LimitExceeded`] for more texels than a texel buffer
+    /// has; [`Error::OutOfMemory`], [`Error::DeviceLost`].
     pub fn new(gpu: &Gpu, radiance: &MapImage, image: &ImpostorImage) -> Result<Self> {
         let (map, size) = (image.map(), image.size());
         if radiance.map() != map || radiance.size() != size {

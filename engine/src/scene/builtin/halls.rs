@@ -36,7 +36,7 @@ pub const ATRIUM: Entry = Entry {
             "fill",
             "storey",
             &["storey", "everywhere"],
-            "where the air is a medium: up to the ceiling of the lower gallery, or in all of space",
+            "where the air is a medium: up to the ceiling of the lower gallery, or in all of space, through which no sky shines",
         ),
         Parameter::choice(
             "density",

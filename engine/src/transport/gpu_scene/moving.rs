@@ -83,8 +83,8 @@ impl GpuScene {
         upload(&self.buffers.tangents, &moved.tangents)
     }
 
-    /// Refits the ray index to where objects have been moved ([`GpuScene::move_object`]): rays meet them there from here on, as if the scene had been made so. The
-    /// tree keeps its form, so rays are fast where little has moved, and what is known of it ([`GpuScene::index_statistics`]) stays that of its build. It is
+    /// Refits the ray index to where objects have been moved ([`GpuScene::move_object`]): rays meet them there from here on, as if the scene had been made so, but
+    /// for triangles without an area to speak of, which the build left out and which stay out. The tree keeps its form, so rays are fast where little has moved, and what is known of it ([`GpuScene::index_statistics`]) stays that of its build. It is
     /// brought to the host and back, with all triangles.
     ///
     /// Pictures under way must be restarted, or they mix both; nothing that reads the scene may be under way.
@@ -93,13 +93,16 @@ impl GpuScene {
     /// [`Error::Setting`] for an index that is no wide hierarchy, and for scenes that keep their instances, whose index follows by itself; [`Error::DeviceLost`],
     /// [`Error::OutOfMemory`].
     pub fn refit_index(&self, gpu: &Gpu) -> Result<()> {
-        let IndexReport { kind, statistics, .. } = self.index.report;
+        let IndexReport {
+            kind,
+            statistics,
+            instead_because,
+            ..
+        } = self.index.report;
         if self.index.traversal != DeviceTraversal::Wide {
-            return Err(Error::setting(
-                "index",
-                kind,
-                "cannot be refitted to objects that moved; wide can",
-            ));
+            let why = instead_because.map_or(String::new(), |why| format!(", which {why} ruled out"));
+            let cause = format!("cannot be refitted to objects that moved; wide can{why}");
+            return Err(Error::setting("index", kind, cause));
         }
         if statistics.triangles == 0 {
             return Ok(());

@@ -314,7 +314,7 @@ impl ManyLight {
         };
         let all = reflective.views(&self.gpu, &self.scene.surfaces())?;
         self.counts.views += all.len() as u64;
-        self.viewed = all.len() as u32;
+        self.viewed = 0;
         let views = LightViews {
             all,
             next: 0,
@@ -348,6 +348,7 @@ impl ManyLight {
 
     /// Virtual lights on the views of a frame: none where those are black.
     fn place_on_views(&mut self, frame: &mut Frame, views: u32) -> Result<(Vec<Timings>, Stage)> {
+        self.viewed = views;
         if self.discs.is_some() {
             frame.views = views;
             return Ok((Vec::new(), self.first_drawing()));

@@ -32,7 +32,7 @@ use glam::UVec4;
 
 /// Tells the numbers of chains from those of other samplers.
 const CHAIN_SEED: u32 = 0x6d65_7472;
-/// Tries anywhere: what they bring tells the power of the pool to a few hundredths even where one in a hundred brings anything.
+/// Tries anywhere: what they bring tells the power of the pool to a tenth or so where one in a hundred brings anything, and to a hundredth where most do.
 const SEEDS: u32 = 16_384;
 /// Chains, of as many lights at least.
 const CHAINS_MAX: u32 = 64;
@@ -62,8 +62,8 @@ pub(super) struct Metropolis {
     seed: u32,
     /// Steps through the index after which a ray stops.
     ray_quota: u32,
-    /// Steps of chains, and tries that measure lights, of a submission.
-    at_once: [u32; 2],
+    /// Tries anywhere, steps of chains, and tries that measure lights, of a submission.
+    at_once: [u32; 3],
 }
 
 /// The chains of a frame, and what of them comes next.
@@ -82,7 +82,8 @@ pub(super) struct Chains {
 }
 
 enum Next {
-    Seeds,
+    /// From that try on.
+    Seeds(u32),
     Steps(u32),
     /// From that try on.
     Powers(u32),
@@ -99,7 +100,7 @@ impl Chains {
             frame,
             size,
             pool,
-            next: Next::Seeds,
+            next: Next::Seeds(0),
             mean: 0.0,
             powers: Vec::new(),
             brings: false,
@@ -169,6 +170,7 @@ impl Metropolis {
             seed: settings.seed,
             ray_quota: index.quota,
             at_once: [
+                SEEDS.div_ceil(Part::count(gpu, u64::from(SEEDS) * index.steps)),
                 steps.div_ceil(Part::count(gpu, u64::from(steps) * u64::from(of_step) * index.steps)),
                 measures
                     .div_ceil(Part::count(gpu, u64::from(measures) * index.steps))
@@ -212,17 +214,20 @@ impl Metropolis {
     /// [`DeviceLost`](crate::Error::DeviceLost).
     pub fn record(&self, recorder: &mut Recorder, sight: &Sight<'_>, chains: &Chains, is_shown: bool) -> Result<u64> {
         match chains.next {
-            Next::Seeds => {
+            Next::Seeds(first) => {
+                let range = [first, self.seeds_end(first)];
                 recorder.pass("many-light: seeds of chains", |pass| {
                     if !is_shown {
                         sight.seen.show(pass);
                     }
-                    pass.memory_barrier(Access::COMPUTE | Access::TRANSFER_READ, Access::TRANSFER_WRITE);
-                    pass.fill(self.counters.view(), 0)?;
-                    pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
-                    self.try_range(pass, sight, chains, METROPOLIS_SEEDS, 0, [0, SEEDS])
+                    if first == 0 {
+                        pass.memory_barrier(Access::COMPUTE | Access::TRANSFER_READ, Access::TRANSFER_WRITE);
+                        pass.fill(self.counters.view(), 0)?;
+                        pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
+                    }
+                    self.try_range(pass, sight, chains, METROPOLIS_SEEDS, 0, range)
                 })?;
-                Ok(SEEDS.into())
+                Ok(u64::from(range[1] - first))
             }
             Next::Steps(first) => {
                 let end = self.steps_end(first);
@@ -253,7 +258,8 @@ impl Metropolis {
     /// [`Overflow`](crate::Error::Overflow) should the index have rays that never end.
     pub fn learn(&self, gpu: &Gpu, chains: &mut Chains) -> Result<()> {
         chains.next = match chains.next {
-            Next::Seeds => {
+            Next::Seeds(first) if self.seeds_end(first) < SEEDS => Next::Seeds(self.seeds_end(first)),
+            Next::Seeds(_) => {
                 let tried: Vec<MetropolisTry> = gpu.read(self.tried.view(), SEEDS as usize)?;
                 chains.mean = tried.iter().map(|found| f64::from(found.brings)).sum::<f64>() / f64::from(SEEDS);
                 if chains.mean > 0.0 {
@@ -326,13 +332,17 @@ impl Metropolis {
         self.lights.div_ceil(self.chains) * self.steps_a_light
     }
 
+    fn seeds_end(&self, first: u32) -> u32 {
+        first.saturating_add(self.at_once[0]).min(SEEDS)
+    }
+
     fn steps_end(&self, first: u32) -> u32 {
-        first.saturating_add(self.at_once[0]).min(self.steps())
+        first.saturating_add(self.at_once[1]).min(self.steps())
     }
 
     fn powers_end(&self, first: u32) -> u32 {
         first
-            .saturating_add(self.at_once[1])
+            .saturating_add(self.at_once[2])
             .min(self.lights * self.power_pixels)
     }
 

@@ -178,8 +178,8 @@ rows! {
         scene: String = "scene",
         stage: String = "stage",
         jobs: Option<f64> = "jobs per frame",
-        later_jobs: Option<f64> = "of them after the first bounce",
-        first: Repeats = "first bounce (ms)",
+        later_jobs: Option<f64> = "of them after the first ray of a path",
+        first: Repeats = "first ray of a path (ms)",
         later: Repeats = "after it (ms)",
         share: Repeats = "share of the frame (%)",
     }
