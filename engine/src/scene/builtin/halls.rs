@@ -12,10 +12,10 @@ use glam::{DVec3, Vec3};
 use super::Entry;
 use super::media::{ABSORPTION, G, PHASE, SCATTERING, add_boundary, add_medium, medium, surround};
 use super::parameters::{Parameter, Values};
-use super::shapes::{MeshBuilder, arch, lathe, sheet};
+use super::shapes::{MeshBuilder, arch, lathe, point_lamp, sheet};
 use super::textures::sky;
 use crate::Result;
-use crate::scene::{Camera, DensityGrid, LightKind, Material, Mesh, Scene};
+use crate::scene::{Camera, DensityGrid, Material, Mesh, Scene};
 
 pub const ATRIUM: Entry = Entry {
     name: "atrium",
@@ -104,10 +104,6 @@ fn put(to: &mut MeshBuilder, mesh: &Mesh, quarters: u32, offset: Vec3) {
         };
         turned + offset
     });
-}
-
-fn lamp(scene: &mut Scene, position: Vec3, intensity: Vec3) {
-    scene.add_light("lamp", LightKind::Point { position, intensity });
 }
 
 /// A density over the unit cube: whole waves along each axis, so that the mean of a grid's cells is 1.
@@ -277,7 +273,7 @@ fn atrium(values: &Values) -> Result<Scene> {
     if values.word("source")? == "sky" {
         scene.environment = Some(sky(Vec3::new(0.3, 0.85, 0.25).normalize(), 1.0));
     } else {
-        lamp(&mut scene, Vec3::new(0.0, 4.0, 0.0), values.color("light")?);
+        point_lamp(&mut scene, Vec3::new(0.0, 4.0, 0.0), values.color("light")?);
     }
     fill_courtyard(&mut scene, values, outer, TOP)?;
     let far = f64::from(half.x) - 0.8;
@@ -454,7 +450,7 @@ fn cathedral(values: &Values) -> Result<Scene> {
     }
     scene.place(altar.build());
     if values.word("source")? == "point" {
-        lamp(
+        point_lamp(
             &mut scene,
             Vec3::new(0.0, 7.0, length / 2.0),
             values.color("light")? * 100.0,
