@@ -25,6 +25,7 @@ mod shapes;
 mod slab;
 mod soup;
 mod sphere_flake;
+mod surfaces;
 mod textures;
 mod unit_box;
 mod volumes;

@@ -9,6 +9,9 @@ use glam::{DVec3, Vec2, Vec3};
 
 use crate::scene::{LightKind, Mesh, Scene};
 
+/// A finger's breadth between what stands and what it stands on, so that no two faces coincide, m.
+pub const REST: f32 = 0.005;
+
 /// Collects faces into one mesh.
 #[derive(Debug, Default)]
 pub struct MeshBuilder {
