@@ -40,8 +40,6 @@ const OWN: [(&str, &str); 1] = [("passage, haze", "builtin:passage?sigma_a=0.05&
 /// Means may differ by that much, relatively, or by so many standard errors.
 const ALLOWED: f64 = 0.01;
 const DEVIATIONS: f64 = 3.0;
-/// The least relative MSE that has a logarithm.
-const TINY: f64 = 1e-12;
 
 rows! {
     /// A scene's medium.
@@ -244,7 +242,7 @@ impl Stage {
         let error = unbiased::measure(&rendered.picture, &self.reference)?;
         Ok(Some([
             mean(&rendered.picture)?,
-            error.relative_mse.max(TINY).sqrt(),
+            unbiased::relative_rmse(&error),
             rendered.report.render_seconds,
         ]))
     }
