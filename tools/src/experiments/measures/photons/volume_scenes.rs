@@ -17,6 +17,7 @@ use super::scenarios::{PublishedMedium, SCENARIOS, Scenario, by_name};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::{greatest, mean_with_error};
+use crate::experiments::measures::pictures::mean;
 use crate::experiments::reference::SEED;
 use crate::experiments::sweep::SPP_MAX;
 use crate::experiments::unbiased;
@@ -280,10 +281,4 @@ impl Stage {
             photon_seconds,
         }))
     }
-}
-
-/// The mean of all pixels and channels.
-fn mean(picture: &Picture) -> Result<f64> {
-    let values = picture.main_layer()?.values();
-    Ok(values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64)
 }
