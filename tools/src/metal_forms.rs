@@ -13,6 +13,11 @@ use glam::DVec3;
 /// The cosines that errors are taken over: even steps from 0 to 1, both included.
 pub const STEPS: u32 = 20_000;
 
+/// Cosines from 0 to 1 in so many even steps, both included.
+pub fn cosines(steps: u32) -> impl Iterator<Item = f64> {
+    (0..=steps).map(move |i| f64::from(i) / f64::from(steps))
+}
+
 /// A way to evaluate a band of a metal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
@@ -76,8 +81,7 @@ impl FormError {
     pub fn of(way: Way, n: f64, k: f64, steps: u32) -> Self {
         let curve = way.curve(n, k);
         let mut found = Self::default();
-        for i in 0..=steps {
-            let c = f64::from(i) / f64::from(steps);
+        for c in cosines(steps) {
             let exact = fresnel_conductor(c, DVec3::splat(n), DVec3::splat(k)).x;
             let error = (curve(c) - exact).abs();
             let relative = error / exact;

@@ -116,25 +116,11 @@ impl SplatAtlas {
             let value = format!("{} of side {} with {} points", desc.maps, desc.side, desc.points);
             return Err(Error::setting("imperfect shadow maps", value, "are none"));
         }
-        let limit = gpu.caps().max_storage_buffer_range;
-        let check = |name: &str, value: u64| match value <= limit {
-            true => Ok(value),
-            false => Err(Error::LimitExceeded {
-                name: name.into(),
-                value,
-                limit_name: "maxStorageBufferRange",
-                limit,
-            }),
-        };
-        let bytes = check(
-            "imperfect shadow maps",
-            desc.map_bytes().saturating_mul(u64::from(desc.maps)),
-        )?;
+        let bytes = desc.map_bytes().saturating_mul(u64::from(desc.maps));
+        gpu.caps().check_storage("imperfect shadow maps", bytes)?;
         let pool = u64::from(desc.points) * u64::from(STRATA);
-        check(
-            "points of imperfect shadow maps",
-            pool * size_of::<OrientedSurfel>() as u64,
-        )?;
+        let of_points = pool * size_of::<OrientedSurfel>() as u64;
+        gpu.caps().check_storage("points of imperfect shadow maps", of_points)?;
         let triangles = surfaces.set.scene_triangles.buffer().view();
         let triangles: Vec<SceneTriangle> = gpu.read(triangles, surfaces.triangles as usize)?;
         let corners: Vec<_> = triangles

@@ -360,13 +360,9 @@ fn prints_its_hash_when_asked() {
         words.extend([made.fetches.nodes as u32, made.fetches.records as u32]);
     }
     for form in FEW_FORMS {
-        words.extend(made_bits(&gpu, &boxes(uneven(coloured())), &whole, form));
-        words.extend(made_bits(&gpu, &boxes(coloured()), &stopping, form));
+        words.extend(made(&gpu, &boxes(uneven(coloured())), &whole, form).bits);
+        words.extend(made(&gpu, &boxes(coloured()), &stopping, form).bits);
     }
     print_hash(words);
     clerestory_tests::assert_no_messages(&gpu);
-}
-
-fn made_bits(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, form: Form) -> Vec<u32> {
-    made(gpu, scene, settings, form).bits
 }

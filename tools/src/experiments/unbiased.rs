@@ -34,6 +34,14 @@ pub struct UnbiasedError {
     pub skipped: u64,
 }
 
+/// The least relative MSE that has a logarithm.
+const LEAST_RELATIVE_MSE: f64 = 1e-12;
+
+/// The root of a relative MSE, and of 10⁻¹² where a single estimate comes out below that.
+pub fn relative_rmse(found: &UnbiasedError) -> f64 {
+    found.relative_mse.max(LEAST_RELATIVE_MSE).sqrt()
+}
+
 /// Neumaier's compensated sum is the engine's own; pictures here are small enough for pairwise halves, which err by log₂ n roundings.
 fn sum(values: &[f64]) -> f64 {
     const LEAF: usize = 64;

@@ -8,9 +8,10 @@ use glam::{DVec3, Vec3};
 
 use super::Entry;
 use super::parameters::{Parameter, Values};
-use super::shapes::{MeshBuilder, cuboid_faces, geodesic_sphere};
+use super::shapes::{MeshBuilder, REST, cuboid_faces, geodesic_sphere};
+use super::surfaces::glossy;
 use crate::Result;
-use crate::scene::{Camera, Material, Mesh, Scene, metals};
+use crate::scene::{Camera, Material, Mesh, Scene};
 
 pub const FIREBALLS: Entry = Entry {
     name: "fireballs",
@@ -44,8 +45,6 @@ const BALL_HEIGHT: f32 = 0.55;
 const BALL_RADIUS: f64 = 0.14;
 /// 20 · 4² triangles.
 const BALL_FREQUENCY: u32 = 4;
-/// Below a body, m.
-const REST: f32 = 0.005;
 
 /// Radius of a creature without what sticks out, m.
 const RADIUS: f64 = 0.45;
@@ -72,21 +71,8 @@ fn build(values: &Values) -> Result<Scene> {
     place_room(&mut scene);
     let roughness = values.real("roughness")? as f32;
     let material = scene.add_material(match values.word("surface")? {
-        "mirror" => Material {
-            roughness,
-            ..Material::mirror("mirror", Vec3::splat(0.95))
-        },
-        "plastic" => Material {
-            specular: 1.0,
-            roughness,
-            ..Material::lambert("plastic", Vec3::new(0.55, 0.5, 0.45))
-        },
         "matte" => Material::lambert("matte", Vec3::splat(0.7)),
-        _ => Material {
-            conductor: metals::by_name("gold"),
-            roughness,
-            ..Material::mirror("gold", Vec3::ONE)
-        },
+        word => glossy(word, Vec3::new(0.55, 0.5, 0.45), roughness),
     });
     let mut fire = Material::lambert("fire", Vec3::ZERO);
     fire.emission = values.color("light")?;

@@ -9,10 +9,10 @@ use glam::{DAffine3, DQuat, DVec3, Quat, Vec3};
 use super::Entry;
 use super::noise::{unit, value_noise};
 use super::parameters::{Parameter, Values};
-use super::shapes::{MeshBuilder, geodesic_sphere, lathe, sheet};
+use super::shapes::{MeshBuilder, geodesic_sphere, lathe, point_lamp, sheet};
 use super::textures::sky;
 use crate::Result;
-use crate::scene::{Camera, Instance, LightKind, Material, Mesh, Scene};
+use crate::scene::{Camera, Instance, Material, Mesh, Scene};
 
 pub const FOREST: Entry = Entry {
     name: "forest",
@@ -114,8 +114,7 @@ fn build(values: &Values) -> Result<Scene> {
         scene.environment = Some(sky(Vec3::new(0.4, 0.7, 0.3).normalize(), 1.0));
     } else {
         let position = Vec3::new(0.0, ground(seed, 0.0, 0.0) + 2.0, 0.0);
-        let intensity = values.color("light")?;
-        scene.add_light("lamp", LightKind::Point { position, intensity });
+        point_lamp(&mut scene, position, values.color("light")?);
     }
     let eye = |x: f64, z: f64, above: f64| DVec3::new(x, f64::from(ground(seed, x as f32, z as f32)) + above, z);
     scene.cameras.push(Camera::look_at(

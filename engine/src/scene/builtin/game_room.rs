@@ -4,10 +4,11 @@ use glam::{DAffine3, DVec3, Vec2, Vec3};
 
 use super::Entry;
 use super::parameters::{Parameter, Values};
-use super::shapes::{MeshBuilder, cuboid_faces, geodesic_sphere, textured_quad};
+use super::shapes::{MeshBuilder, REST, cuboid_faces, geodesic_sphere, textured_quad};
+use super::surfaces::{glossy, plastic};
 use super::textures::{checker, plain};
 use crate::Result;
-use crate::scene::{Camera, Filter, LightKind, Material, Mesh, Scene, metals};
+use crate::scene::{Camera, Filter, LightKind, Material, Mesh, Scene};
 
 pub const GAME_ROOM: Entry = Entry {
     name: "game-room",
@@ -46,8 +47,6 @@ pub const GAME_ROOM: Entry = Entry {
 /// Half of the room's sides, and its height, m.
 const HALF: Vec2 = Vec2::new(4.0, 3.0);
 const HEIGHT: f32 = 3.0;
-/// A finger's breadth between what stands and what it stands on, so that no two faces coincide.
-const REST: f32 = 0.005;
 /// Tiles across the floor's longer side.
 const TILES: u32 = 8;
 /// Lower and upper corners of crates, the second one on the first.
@@ -103,18 +102,7 @@ fn build(values: &Values) -> Result<Scene> {
     }
     place_lamps(&mut scene, values.color("light")?, values.word("source")? == "area");
     let roughness = values.real("roughness")? as f32;
-    let surface = match values.word("surface")? {
-        "gold" => Material {
-            conductor: metals::by_name("gold"),
-            roughness,
-            ..Material::mirror("gold", Vec3::ONE)
-        },
-        "plastic" => plastic("plastic", Vec3::new(0.6, 0.6, 0.55), roughness),
-        _ => Material {
-            roughness,
-            ..Material::mirror("mirror", Vec3::splat(0.95))
-        },
-    };
+    let surface = glossy(values.word("surface")?, Vec3::new(0.6, 0.6, 0.55), roughness);
     let object = values.word("object")?;
     if object != "none" {
         let surface = scene.add_material(surface);
@@ -129,14 +117,6 @@ fn build(values: &Values) -> Result<Scene> {
     ));
     scene.defaults.aspect = Some(4.0 / 3.0);
     Ok(scene)
-}
-
-fn plastic(name: &str, color: Vec3, roughness: f32) -> Material {
-    Material {
-        specular: 1.0,
-        roughness,
-        ..Material::lambert(name, color)
-    }
 }
 
 fn place_walls(scene: &mut Scene) {

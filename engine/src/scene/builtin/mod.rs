@@ -3,6 +3,8 @@
 //! Each scene is a pure function of its parameters: the same address gives the same bits on every machine with IEEE 754 arithmetic and
 //! the same mathematics library. Every scene has a camera named `main` and a `defaults.aspect`.
 
+mod atrium;
+mod cathedral;
 mod city;
 mod conference;
 mod cornell;
@@ -25,6 +27,7 @@ mod shapes;
 mod slab;
 mod soup;
 mod sphere_flake;
+mod surfaces;
 mod textures;
 mod unit_box;
 mod volumes;
@@ -55,10 +58,10 @@ pub struct Entry {
 /// All generated scenes, by name.
 pub fn catalogue() -> &'static [Entry] {
     &[
-        halls::ATRIUM,
+        atrium::ATRIUM,
         city::BOX_CITY,
         rooms::BOX_ROOM,
-        halls::CATHEDRAL,
+        cathedral::CATHEDRAL,
         volumes::CLOUD,
         conference::CONFERENCE,
         cornell::CORNELL_BOX,

@@ -9,10 +9,10 @@ use glam::{DVec3, Vec2, Vec3};
 use super::Entry;
 use super::media::{ABSORPTION, G, PHASE, SCATTERING, surround};
 use super::parameters::{Parameter, Values};
-use super::shapes::{MeshBuilder, cuboid_faces, lat_long_sphere, textured_quad};
+use super::shapes::{MeshBuilder, cuboid_faces, lat_long_sphere, point_lamp, textured_quad};
 use super::textures::{checker, plain};
 use crate::Result;
-use crate::scene::{Camera, Filter, LightKind, Material, Scene, metals};
+use crate::scene::{Camera, Filter, Material, Scene, metals};
 
 /// What a sphere may be made of.
 const METALS: &[&str] = &["gold", "silver", "copper", "aluminium", "mirror", "none"];
@@ -123,11 +123,6 @@ fn panel(scene: &mut Scene, radiance: Vec3, middle: Vec3, half: Vec2) {
     );
 }
 
-/// A point light.
-fn lamp(scene: &mut Scene, position: Vec3, intensity: Vec3) {
-    scene.add_light("lamp", LightKind::Point { position, intensity });
-}
-
 /// The sphere of the parameters `object` and `place`, somewhere on a way: metal of this perceptual roughness.
 fn metal_sphere(
     scene: &mut Scene,
@@ -170,7 +165,7 @@ fn box_room(values: &Values) -> Result<Scene> {
     if values.word("source")? == "area" {
         panel(&mut scene, light, Vec3::new(3.0, 2.98, 3.0), Vec2::splat(0.6));
     } else {
-        lamp(&mut scene, Vec3::new(3.0, 2.5, 3.0), light);
+        point_lamp(&mut scene, Vec3::new(3.0, 2.5, 3.0), light);
     }
     if values.word("contents")? == "furnished" {
         // A finger's breadth above the floor, so that no two faces coincide.
@@ -316,7 +311,7 @@ fn divider_room(values: &Values) -> Result<Scene> {
     if values.word("source")? == "area" {
         panel(&mut scene, light, Vec3::new(0.0, 1.98, -0.6), Vec2::new(0.7, 0.7));
     } else {
-        lamp(&mut scene, Vec3::new(0.0, 1.6, 0.0), light);
+        point_lamp(&mut scene, Vec3::new(0.0, 1.6, 0.0), light);
     }
     scene.cameras.push(Camera::look_at(
         "main",

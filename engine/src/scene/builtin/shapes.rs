@@ -1,4 +1,4 @@
-//! Triangle meshes of simple bodies, as the generated scenes need them.
+//! Triangle meshes of simple bodies, and a lamp, as the generated scenes need them.
 //!
 //! Every closed body has outward counter-clockwise faces and no T-junctions, so that a watertight ray test sees it closed.
 
@@ -7,7 +7,10 @@ use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use crate::scene::Mesh;
+use crate::scene::{LightKind, Mesh, Scene};
+
+/// A finger's breadth between what stands and what it stands on, so that no two faces coincide, m.
+pub const REST: f32 = 0.005;
 
 /// Collects faces into one mesh.
 #[derive(Debug, Default)]
@@ -359,6 +362,11 @@ pub fn sheet(name: &str, material: u32, columns: u32, rows: u32, place: impl Fn(
         }
     }
     mesh
+}
+
+/// Adds a point light named `lamp`; intensity in W/sr.
+pub fn point_lamp(scene: &mut Scene, position: Vec3, intensity: Vec3) {
+    scene.add_light("lamp", LightKind::Point { position, intensity });
 }
 
 /// Turns a mesh inside out: faces and normals point the other way.

@@ -56,7 +56,7 @@ impl std::ops::AddAssign for GatherCounts {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[non_exhaustive]
 pub struct RayFetches {
-    /// Queries of rays behind the first bounce.
+    /// Queries of rays after the first one of a path, which may be one that has only crossed a boundary.
     pub later_queries: u64,
     /// Nodes of the map that were fetched, two at a time, once for all rays of a subgroup that go through it together.
     pub nodes: u64,

@@ -16,6 +16,19 @@ pub fn finished(technique: &mut impl Technique, samples: u32) -> Result<Picture>
     Ok(technique.picture()?.0)
 }
 
+/// The mean of all pixels and channels; 0 of none.
+///
+/// # Errors
+/// [`clerestory::Error::Picture`] without a colour layer.
+pub fn mean(picture: &Picture) -> Result<f64> {
+    Ok(mean_of(picture.main_layer()?.values()))
+}
+
+/// The mean of values; 0 of none.
+pub fn mean_of(values: &[f32]) -> f64 {
+    values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64
+}
+
 /// A picture with the variance of its means.
 pub struct Image {
     /// RGB a pixel.

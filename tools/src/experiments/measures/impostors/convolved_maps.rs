@@ -15,6 +15,7 @@ use clerestory::maps::wavelets::WaveletLight;
 use clerestory::maps::{MapImage, Parametrization};
 use glam::{DVec3, UVec2};
 
+use super::gather_glossy::at_the_maps_place;
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, rows};
 use crate::experiments::measures::Context;
 use crate::metal_forms::sheet;
@@ -153,13 +154,7 @@ fn wavelets(room: &LitRoom, map: &MapImage, points: u32) -> Result<Vec<Wavelets>
 
 /// Harmonics of orders 0 to 6 at points of the unit sphere about the map's place.
 fn harmonics(room: &LitRoom, map: &MapImage, count: u32) -> Result<Vec<Harmonics>> {
-    let points: Vec<GatherPoint> = LitRoom::points(DVec3::ZERO, count)
-        .into_iter()
-        .map(|point| GatherPoint {
-            position: DVec3::ZERO,
-            ..point
-        })
-        .collect();
+    let points = at_the_maps_place(&LitRoom::points(DVec3::ZERO, count));
     let exact: Vec<f64> = points.iter().map(|point| room.irradiance(point)).collect();
     let mean = exact.iter().sum::<f64>() / exact.len().max(1) as f64;
     let row = |order: u32| {
@@ -234,13 +229,7 @@ fn lobes(context: &Context<'_>, room: &LitRoom, of_map: f64) -> Result<Vec<Lobes
             .gather(&GatherPoint { position, axis }, Lobe::Middles(exponent), Terms::All)
             .x
     };
-    let points: Vec<GatherPoint> = LitRoom::points(DVec3::ZERO, count)
-        .into_iter()
-        .map(|point| GatherPoint {
-            position: DVec3::ZERO,
-            ..point
-        })
-        .collect();
+    let points = at_the_maps_place(&LitRoom::points(DVec3::ZERO, count));
     let (kind, size) = (Parametrization::Cube, UVec2::splat(to));
     let mut shown = Vec::new();
     let mut last = None;

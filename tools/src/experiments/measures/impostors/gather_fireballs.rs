@@ -12,7 +12,8 @@ use clerestory::maps::impostor::{ImpostorImage, ImpostorSurface};
 use clerestory::maps::{MapImage, Parametrization};
 use glam::{DVec3, UVec2};
 
-use super::gather_glossy::{CLASSICAL, CLASSICAL_SIDE, way};
+use super::exact_room::mean;
+use super::gather_glossy::{CLASSICAL, CLASSICAL_SIDE, at_the_maps_place, way};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, curves, rows};
 use crate::experiments::measures::Context;
 
@@ -174,23 +175,15 @@ pub fn parts(context: &Context<'_>, gpu: &Gpu) -> Result<Vec<Part>> {
     };
     let at = |height: f64| -> Result<Vec<(String, Vec<f64>)>> {
         let points = points(height, count);
-        let centred: Vec<GatherPoint> = points
-            .iter()
-            .map(|point| GatherPoint {
-                position: DVec3::ZERO,
-                ..*point
-            })
-            .collect();
         let mut ways = vec![
             (EXACT.to_owned(), exact(&points, directions)),
-            (CLASSICAL.to_owned(), gathered(&still, &centred)?),
+            (CLASSICAL.to_owned(), gathered(&still, &at_the_maps_place(&points))?),
         ];
         for (side, gather) in &gathers {
             ways.push((way(*side), gathered(gather, &points)?));
         }
         Ok(ways)
     };
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let in_the_middle = at(MIDDLE)?;
     context.each(
         &HEIGHTS,

@@ -81,7 +81,7 @@ const CRITERIA: &[Criterion<Row>] = &[
 ];
 
 /// Points at the map's place, with their axes.
-fn at_the_maps_place(points: &[GatherPoint]) -> Vec<GatherPoint> {
+pub fn at_the_maps_place(points: &[GatherPoint]) -> Vec<GatherPoint> {
     let moved = |point: &GatherPoint| GatherPoint {
         position: DVec3::ZERO,
         ..*point

@@ -12,6 +12,7 @@ use clerestory::maps::impostor::room::BoxRoom;
 use clerestory::maps::impostor::{ImpostorImage, ImpostorRay, ImpostorSettings, SearchMethod};
 use glam::{DVec3, UVec2};
 
+use super::gather_glossy::{CLASSICAL_SIDE, at_the_maps_place};
 use super::published_lobe;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
@@ -64,8 +65,6 @@ const PRINTED: &str = "five, as printed";
 const ALL: &str = "all";
 const CLASSICAL: &str = "all, at the map's place";
 const LOOK_UP: &str = "one look-up of a convolved map";
-/// Texels along a face's side of the map at its place.
-const CLASSICAL_SIDE: u32 = 32;
 
 const CRITERIA: &[Criterion<Row>] = &[
     Criterion::each(
@@ -218,12 +217,7 @@ impl Study for Found {
                 let found = Gather::new(&gpu, lights, &settings, *exponent)?.gather(points)?;
                 Ok(found.into_iter().map(|value| value.x).collect())
             };
-            let at_the_maps_place = |point: &GatherPoint| GatherPoint {
-                position: DVec3::ZERO,
-                ..*point
-            };
-            let moved: Vec<GatherPoint> = points.iter().map(at_the_maps_place).collect();
-            let classical = values(&still, Terms::All, &moved)?;
+            let classical = values(&still, Terms::All, &at_the_maps_place(&points))?;
             let [rms_of_classical, _] = relative_errors(&classical, &exact);
             let row = |side: u32, terms: &str, found: &[f64], of_all: Option<f64>| {
                 let [rms, bias] = relative_errors(found, &exact);

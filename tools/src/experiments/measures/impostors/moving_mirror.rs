@@ -13,6 +13,8 @@ use clerestory::{Result, scene};
 use glam::{DAffine3, DVec3, Vec3};
 use serde_json::json;
 
+use crate::experiments::measures::preview::previewed::REFERENCE_SEED;
+
 /// A room whose last object is a mirror sphere, lit by points.
 const SCENE: &str = "builtin:game-room";
 /// What the preview shows of it: direct light, and what the mirror shows of that.
@@ -33,7 +35,6 @@ const RIM: f64 = 0.95;
 pub const STEPS: u32 = 3;
 /// Texels along a side of the finest filtered level; mirrors look none of these up.
 const FINEST: u32 = 32;
-const REFERENCE_SEED: u32 = 2;
 
 /// How much is drawn.
 #[derive(Debug, Clone, Copy)]

@@ -19,6 +19,7 @@ use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats
 use crate::experiments::measures::Context;
 use crate::experiments::measures::maps::sphere::sheet;
 use crate::experiments::measures::pictures::finished;
+use crate::experiments::reference::SEED;
 
 /// A room with its sphere.
 struct Room {
@@ -80,8 +81,6 @@ const WAYS: [Way; 4] = [
     (EIGHT_STEPS, ReflectionMethod::FalsePosition, 8),
 ];
 const TURNS: usize = 7;
-/// Seed of the reference, which no picture has.
-const REFERENCE_SEED: u32 = 1_000_003;
 /// Of shown pictures: walls that a point light lights are dark.
 const TONE: ToneMap = ToneMap {
     exposure: 1.0,
@@ -216,7 +215,7 @@ fn at_a_place(
         };
         PathTracer::new(gpu, Arc::clone(&on_device), &camera, size, settings)
     };
-    let reference = finished(&mut by_paths(REFERENCE_SEED)?, sizes.reference)?;
+    let reference = finished(&mut by_paths(SEED)?, sizes.reference)?;
     let mut techniques: Vec<(&'static str, Box<dyn Technique>)> = Vec::new();
     for (name, method, steps) in ways {
         let settings = ReflectionSettings {

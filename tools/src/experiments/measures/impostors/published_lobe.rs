@@ -11,14 +11,13 @@ use clerestory::maps::gather::{GatherLight, GatherLights, GatherPoint, SolidAngl
 use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
 use glam::{DVec3, UVec2};
 
+use super::gather_glossy::CLASSICAL_SIDE;
 use crate::experiments::findings::{Bound, Criterion, rows};
 use crate::experiments::measures::Context;
 
 const POINTS: u32 = 400;
 /// Directions along the sides of the faces of a cube that the oracle sums over.
 const DIRECTIONS: u32 = 96;
-/// Texels along a face's side of the map at its place.
-const CLASSICAL_SIDE: u32 = 32;
 const SIDES: [u32; 3] = [4, 8, 16];
 const EYE: DVec3 = ShinySphere::B.camera;
 

@@ -21,6 +21,7 @@ use super::cases::mapper;
 use crate::experiments::findings::{Bound, Criterion, Findings, Study, change, largest, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::mean_with_error;
+use crate::experiments::measures::pictures::mean;
 
 /// Pixels, all of which see the same ray.
 const SIZE: [u32; 2] = [2, 2];
@@ -296,10 +297,8 @@ impl<'a> Setup<'a> {
         for pass in 1..=passes {
             while mapper.step(pass)?.is_some() {}
             let (picture, _) = mapper.picture()?;
-            let all = picture.main_layer()?.values();
-            let mean = all.iter().map(|value| f64::from(*value)).sum::<f64>() / all.len() as f64;
             // The picture is the mean of its passes so far.
-            let total = mean * f64::from(pass);
+            let total = mean(&picture)? * f64::from(pass);
             values.push(total - before);
             before = total;
         }

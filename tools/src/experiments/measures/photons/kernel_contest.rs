@@ -16,8 +16,6 @@ const SMOKE_PICTURE: (u32, u32) = (8, 256);
 const TURNS: usize = 5;
 /// Passes that say how long one takes.
 const FEW_PASSES: u32 = 2;
-/// The least relative MSE that has a logarithm.
-const TINY: f64 = 1e-12;
 /// Curves count as at least that steep where they are read off beyond their budgets.
 const FLATTEST: f64 = -0.1;
 
@@ -145,7 +143,7 @@ impl Stage {
             return Ok(None);
         };
         let found = unbiased::measure(&rendered.picture, &self.reference.picture)?;
-        let error = found.relative_mse.max(TINY).sqrt();
+        let error = unbiased::relative_rmse(&found);
         let of_reference = found.reference_relative_mse.sqrt() / error;
         Ok(Some([error, rendered.report.render_seconds, of_reference]))
     }

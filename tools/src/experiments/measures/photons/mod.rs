@@ -2,6 +2,7 @@
 
 pub mod beam_estimate;
 pub mod cases;
+mod frames;
 mod kernel_contest;
 mod kernel_statistics;
 pub mod map_builds;

@@ -13,6 +13,7 @@ use clerestory::{Result, scene};
 use glam::Vec3;
 
 use super::cases::{Case, cases, mapper, published};
+use super::frames::{PHOTON_PASSES, STEP, milliseconds, rate};
 use super::map_builds;
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
@@ -24,10 +25,7 @@ const SMOKE: ([u32; 2], u32) = ([16, 12], 2);
 const SMOKE_CASES: &[&str] = &["Passage"];
 /// The counterpart of the scene that has the other profile too.
 const OF_BOTH_PROFILES: &str = "Ring";
-/// The light's way in a frame: 3 cm an axis, away from ceilings.
-const STEP: Vec3 = Vec3::new(0.03, -0.03, 0.03);
-/// How passes of photons are called, those of their map, and that of queries among the eye's.
-const PHOTON_PASSES: &str = "photon: ";
+/// How passes of photons' map are called, and that of queries among the eye's.
 const MAP_PASSES: &str = "map: ";
 const GATHER_PASSES: &str = "photon: gather";
 
@@ -200,7 +198,7 @@ impl Frame {
 
     fn add(&mut self, timings: &Timings) {
         for pass in &timings.passes {
-            let milliseconds = pass.nanoseconds.unwrap_or(0) as f64 * 1e-6;
+            let milliseconds = milliseconds(pass);
             if pass.name.starts_with(GATHER_PASSES) {
                 self.gather += milliseconds;
                 self.render += milliseconds;
@@ -234,9 +232,4 @@ impl Row {
             built: of(|frame| rate(frame.records, frame.map)),
         }
     }
-}
-
-/// Thousands a second; 0 without timestamps.
-fn rate(count: f64, milliseconds: f64) -> f64 {
-    if milliseconds > 0.0 { count / milliseconds } else { 0.0 }
 }

@@ -8,6 +8,7 @@ use clerestory::techniques::photon_mapping::{MapQuery, MapQueue, PhotonMapper, P
 use clerestory::{Result, scene};
 
 use super::cases::{mapper, settings};
+use super::frames::milliseconds;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::reference::short_name;
@@ -131,17 +132,17 @@ const CRITERIA: &[Criterion<Row>] = &[
 
 /// GPU milliseconds of a frame's queries with their queues, and of the queues alone.
 fn frame(mapper: &mut PhotonMapper, samples: u32) -> Result<[f64; 2]> {
-    let mut milliseconds = [0.0; 2];
+    let mut sums = [0.0; 2];
     while let Some(step) = mapper.step(samples)? {
         for pass in step.timings.iter().flat_map(|timings| &timings.passes) {
-            for (sum, name) in milliseconds.iter_mut().zip([GATHER_PASSES, QUEUE_PASSES]) {
+            for (sum, name) in sums.iter_mut().zip([GATHER_PASSES, QUEUE_PASSES]) {
                 if pass.name.starts_with(name) {
-                    *sum += pass.nanoseconds.unwrap_or(0) as f64 * 1e-6;
+                    *sum += milliseconds(pass);
                 }
             }
         }
     }
-    Ok(milliseconds)
+    Ok(sums)
 }
 
 /// All forms on one scene, with their frames taken in turns: samples of one pass, so that all have the same map.

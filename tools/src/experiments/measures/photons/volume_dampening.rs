@@ -43,8 +43,6 @@ const SMOKE: Form = Form {
 };
 /// A medium that scatters 98 % of what collides, and one that scatters a quarter; a smoke run has these alone.
 const DENSER: [&str; 2] = ["ring, point light", "atrium, neutral"];
-/// The least relative MSE that has a logarithm.
-const TINY: f64 = 1e-12;
 
 /// Sizes of a run.
 #[derive(Clone, Copy)]
@@ -195,7 +193,7 @@ fn rows(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario, depths: Depths) -
             mapper.restart(seed)?;
             let picture = finished(&mut mapper, 1)?;
             let found = unbiased::measure(&picture, &reference)?;
-            error.push(found.relative_mse.max(TINY).sqrt());
+            error.push(unbiased::relative_rmse(&found));
         }
         let beams = mapper.counts().beams;
         rows.push(Row {

@@ -13,6 +13,7 @@ use clerestory::techniques::photon_mapping::PhotonMapper;
 use clerestory::{Result, scene};
 use glam::Vec3;
 
+use super::frames::{PHOTON_PASSES, STEP, milliseconds, rate};
 use super::scenarios::{Depths, SCENARIOS, Scenario, TWO_BOUNCES};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
@@ -22,10 +23,7 @@ const FULL: ([u32; 2], u32, u32) = ([128, 96], 5, 1);
 const SMOKE: ([u32; 2], u32, u32) = ([16, 12], 2, 256);
 /// Scenes of a smoke run.
 const SMOKE_SCENES: usize = 1;
-/// The light's way in a frame: 3 cm an axis, as the source's.
-const STEP: Vec3 = Vec3::new(0.03, -0.03, 0.03);
-/// How passes are called: of photons, of density estimation in media and on surfaces, and of both maps.
-const PHOTON_PASSES: &str = "photon: ";
+/// How passes are called: of density estimation in media and on surfaces, and of both maps.
 const MEDIA_PASSES: [&str; 2] = ["photon: beams", "photon: plane rays"];
 const SURFACE_PASSES: &str = "photon: gather";
 const MAP_PASSES: [&str; 2] = ["map: ", "volume map: "];
@@ -264,7 +262,7 @@ impl Frame {
 
     fn add(&mut self, timings: &Timings) {
         for pass in &timings.passes {
-            let milliseconds = pass.nanoseconds.unwrap_or(0) as f64 * 1e-6;
+            let milliseconds = milliseconds(pass);
             let is_of = |names: &[&str]| names.iter().any(|name| pass.name.starts_with(*name));
             if is_of(&MEDIA_PASSES) {
                 self.estimation += milliseconds;
@@ -305,9 +303,4 @@ impl Row {
             gathered,
         }
     }
-}
-
-/// Thousands a second; 0 without timestamps.
-fn rate(count: f64, milliseconds: f64) -> f64 {
-    if milliseconds > 0.0 { count / milliseconds } else { 0.0 }
 }

@@ -8,6 +8,7 @@ use clerestory::techniques::photon_mapping::{MapQuery, MapQueue, PhotonMapper, P
 use clerestory::{Result, scene};
 
 use super::cases::mapper;
+use super::frames::milliseconds;
 use super::scenarios::{Depths, SCENARIOS, Scenario, TWO_BOUNCES};
 use crate::experiments::findings::{
     Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows,
@@ -268,7 +269,7 @@ impl Frame {
     fn add(&mut self, timings: &Timings, bounces: &mut u32) {
         for pass in &timings.passes {
             *bounces += u32::from(pass.name == BOUNCE_PASS);
-            let milliseconds = pass.nanoseconds.unwrap_or(0) as f64 * 1e-6;
+            let milliseconds = milliseconds(pass);
             let fits = |(_, names): &(&str, &[&str])| names.iter().any(|name| pass.name.starts_with(name));
             if let Some(stage) = STAGES.iter().position(fits) {
                 self.stages[stage][usize::from(*bounces > 1)] += milliseconds;

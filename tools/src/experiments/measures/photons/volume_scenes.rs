@@ -17,6 +17,7 @@ use super::scenarios::{PublishedMedium, SCENARIOS, Scenario, by_name};
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::{greatest, mean_with_error};
+use crate::experiments::measures::pictures::mean;
 use crate::experiments::reference::SEED;
 use crate::experiments::sweep::SPP_MAX;
 use crate::experiments::unbiased;
@@ -40,8 +41,6 @@ const OWN: [(&str, &str); 1] = [("passage, haze", "builtin:passage?sigma_a=0.05&
 /// Means may differ by that much, relatively, or by so many standard errors.
 const ALLOWED: f64 = 0.01;
 const DEVIATIONS: f64 = 3.0;
-/// The least relative MSE that has a logarithm.
-const TINY: f64 = 1e-12;
 
 rows! {
     /// A scene's medium.
@@ -244,7 +243,7 @@ impl Stage {
         let error = unbiased::measure(&rendered.picture, &self.reference)?;
         Ok(Some([
             mean(&rendered.picture)?,
-            error.relative_mse.max(TINY).sqrt(),
+            unbiased::relative_rmse(&error),
             rendered.report.render_seconds,
         ]))
     }
@@ -282,10 +281,4 @@ impl Stage {
             photon_seconds,
         }))
     }
-}
-
-/// The mean of all pixels and channels.
-fn mean(picture: &Picture) -> Result<f64> {
-    let values = picture.main_layer()?.values();
-    Ok(values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64)
 }

@@ -5,7 +5,7 @@ pub mod live_map_pictures;
 pub mod live_maps;
 mod live_stages;
 pub mod planar_mirrors;
-mod previewed;
+pub mod previewed;
 pub mod reflection_maps;
 mod reflection_stages;
 pub mod shadow_maps;

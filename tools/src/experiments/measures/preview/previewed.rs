@@ -14,7 +14,8 @@ use serde_json::json;
 pub const MAP: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
 /// Places of live maps along each axis of the box around a scene, as shares of it: nine at half its height.
 const SHARES: [f32; 3] = [0.25, 0.5, 0.75];
-const REFERENCE_SEED: u32 = 2;
+/// Seed of the path tracer, which no preview has.
+pub const REFERENCE_SEED: u32 = 2;
 
 /// A scene for the preview and for the path tracer.
 pub struct Subject<'a> {

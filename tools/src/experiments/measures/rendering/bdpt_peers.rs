@@ -16,6 +16,8 @@ use clerestory::{Error, Result, atomic, scene};
 use crate::agreement::{python_of_environment, spread};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::errors::mean_with_error;
+use crate::experiments::measures::pictures::mean_of;
 use crate::experiments::reference::short_name;
 use crate::mitsuba::{self, ExportOptions};
 use crate::python;
@@ -168,12 +170,11 @@ impl Contender {
         let middle = median(seconds.0.clone());
         let deviation = seconds.0.iter().map(|s| (s / middle - 1.0).powi(2)).sum::<f64>();
         let means: Vec<f64> = pictures.iter().map(|one| mean_of(one)).collect();
-        let of_all = means.iter().sum::<f64>() / means.len() as f64;
-        let squares: f64 = means.iter().map(|one| (one - of_all).powi(2)).sum();
+        let [of_all, mean_error] = mean_with_error(&means);
         let of_seconds = (deviation / (seconds.0.len() as f64 - 1.0).max(1.0) / seconds.0.len() as f64).sqrt();
         Some(Self {
             mean: of_all,
-            mean_error: (squares / (means.len() as f64 - 1.0).max(1.0) / means.len() as f64).sqrt(),
+            mean_error,
             error: Measured::within(found.relative_mse, MARGIN * found.standard_error),
             uncertainty: (found.standard_error / found.relative_mse).hypot(of_seconds),
             seconds,
@@ -197,11 +198,6 @@ impl Contender {
         let error = (self.mean_error / self.mean).hypot(other.mean_error / other.mean);
         Measured::within(ratio, MARGIN * ratio * error)
     }
-}
-
-/// Mean of values.
-fn mean_of(values: &[f32]) -> f64 {
-    values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len() as f64
 }
 
 impl Study for Found {

@@ -8,7 +8,7 @@ use clerestory::scene::{FresnelForm, metals};
 use super::published_metals::PUBLISHED;
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, curves, rows};
 use crate::experiments::measures::Context;
-use crate::metal_forms::{STEPS, Way};
+use crate::metal_forms::{STEPS, Way, cosines};
 
 /// Metals whose curves are drawn, at these wavelengths in nanometres.
 const METALS: [&str; 4] = ["silver", "copper", "gold", "aluminium"];
@@ -115,10 +115,6 @@ impl Lobe {
 /// n and k of a metal.
 fn index(metal: &str, wavelength: f64) -> Option<[f64; 2]> {
     metals::spectrum(metal).map(|spectrum| spectrum.at(wavelength))
-}
-
-fn cosines(steps: u32) -> impl Iterator<Item = f64> {
-    (0..=steps).map(move |i| f64::from(i) / f64::from(steps))
 }
 
 fn points(metal: &str, wavelength: f64) -> Vec<Point> {

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
-use crate::metal_forms::{FormError, STEPS, Way};
+use crate::metal_forms::{FormError, STEPS, Way, cosines};
 
 /// Cosines of incidence, and for each index the exact factor and Schlick's there.
 const COSINES: [f64; 5] = [1.0, 0.5, 0.2, 0.1, 0.05];
@@ -142,7 +142,7 @@ impl Study for Found {
             }
         });
         let of = |(n, exact, schlick): (f64, [f64; 5], [f64; 5])| {
-            let even = (0..=CURVE_STEPS).map(|i| (f64::from(i) / f64::from(CURVE_STEPS), None));
+            let even = cosines(CURVE_STEPS).map(|cosine| (cosine, None));
             let even = even.filter(|(cosine, _)| !COSINES.contains(cosine));
             let published = (0..COSINES.len()).map(|i| (COSINES[i], Some([exact[i], schlick[i]])));
             let mut all = points(n, published.chain(even));

@@ -7,7 +7,7 @@ use clerestory::scene::FresnelForm;
 
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, curves, rows};
 use crate::experiments::measures::Context;
-use crate::metal_forms::Way;
+use crate::metal_forms::{Way, cosines};
 
 /// The index whose curves are drawn for more and more extinction.
 const INDEX: f64 = 1.5;
@@ -191,8 +191,7 @@ fn exact(n: f64, k: f64) -> Box<dyn Fn(f64) -> f64> {
 
 fn dip((k, [published_normal, published_least, published_place]): (f64, [f64; 3])) -> Dip {
     let factor = exact(INDEX, k);
-    let cosines = (0..=DIP_STEPS).map(|i| f64::from(i) / f64::from(DIP_STEPS));
-    let mut at = cosines.map(|c| (c, factor(c)));
+    let mut at = cosines(DIP_STEPS).map(|c| (c, factor(c)));
     let first = at.next().unwrap_or((0.0, f64::INFINITY));
     let (place, least) = at.fold(first, |least, at| if at.1 < least.1 { at } else { least });
     Dip {
@@ -270,7 +269,7 @@ impl Dips {
         let mut factors = Vec::new();
         for k in (0u32..).zip(DIPS).map(|(k, _)| f64::from(k)) {
             let factor = exact(INDEX, k);
-            for cosine in (0..=CURVE_STEPS).map(|i| f64::from(i) / f64::from(CURVE_STEPS)) {
+            for cosine in cosines(CURVE_STEPS) {
                 factors.push(Factor {
                     k,
                     cosine,

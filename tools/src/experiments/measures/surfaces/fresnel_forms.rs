@@ -18,7 +18,7 @@ use super::fresnel_rescaling::Rescaling;
 use super::published_metals::{PUBLISHED, Published};
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Study, curves, largest, rows};
 use crate::experiments::measures::Context;
-use crate::metal_forms::{FormError, STEPS, Way};
+use crate::metal_forms::{FormError, STEPS, Way, cosines};
 
 /// Other samples of four metals, and the wavelengths at which they were looked at: copper's red at 670 nm.
 const HAGEMANN: [(&str, [f64; 3]); 4] = [
@@ -232,8 +232,7 @@ fn points(metal: &str, wavelength: f64) -> Vec<Point> {
     let mut all = Vec::new();
     for way in [Way::Form(FresnelForm::Exact)].into_iter().chain(Way::ALL) {
         let curve = way.curve(n, k);
-        for i in 0..=CURVE_STEPS {
-            let c = f64::from(i) / f64::from(CURVE_STEPS);
+        for c in cosines(CURVE_STEPS) {
             let exact = fresnel_conductor(c, DVec3::splat(n), DVec3::splat(k)).x;
             if !curve(c).is_finite() {
                 continue;

@@ -8,7 +8,7 @@ use clerestory::transport::fresnel::compensated::{Compensation, rule};
 
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, curves, largest, rows};
 use crate::experiments::measures::Context;
-use crate::metal_forms::{FormError, STEPS, Way};
+use crate::metal_forms::{FormError, STEPS, Way, cosines};
 
 /// The metal whose curves are drawn.
 const INDEX: f64 = 1.5;
@@ -170,7 +170,7 @@ fn points() -> Vec<Point> {
     let [exact, schlick, rescaled] = forms.map(|form| Way::Form(form).curve(INDEX, EXTINCTION));
     let mut all = Vec::new();
     for (form, curve) in forms.into_iter().zip([&exact, &schlick, &rescaled]) {
-        for cosine in (0..=CURVE_STEPS).map(|i| f64::from(i) / f64::from(CURVE_STEPS)) {
+        for cosine in cosines(CURVE_STEPS) {
             let (value, of_schlick) = (curve(cosine), 1.0 - schlick(cosine));
             all.push(Point {
                 form: form.name().into(),
@@ -239,8 +239,7 @@ fn stated(steps: u32) -> Vec<Stated> {
 
 fn term([a, alpha]: [f64; 2]) -> Term {
     let term = Compensation { a, alpha };
-    let cosines = (0..=TERM_STEPS).map(|i| f64::from(i) / f64::from(TERM_STEPS));
-    let taken = cosines.map(|c| (c, term.term(c)));
+    let taken = cosines(TERM_STEPS).map(|c| (c, term.term(c)));
     let (place, most) = taken.fold((0.0, 0.0), |most, at| if at.1 > most.1 { at } else { most });
     // Of second order, since the term is 0 at grazing incidence.
     let slope = -(4.0 * term.term(SLOPE_STEP) - term.term(2.0 * SLOPE_STEP)) / (2.0 * SLOPE_STEP);
@@ -256,8 +255,7 @@ fn term([a, alpha]: [f64; 2]) -> Term {
 
 fn taken([a, alpha]: [f64; 2]) -> Vec<Taken> {
     let term = Compensation { a, alpha };
-    (0..=CURVE_STEPS)
-        .map(|i| f64::from(i) / f64::from(CURVE_STEPS))
+    cosines(CURVE_STEPS)
         .map(|cosine| Taken {
             a,
             alpha,

@@ -8,5 +8,6 @@ pub mod vpl_history;
 pub mod vpl_incremental;
 pub mod vpl_order;
 pub mod vpl_potential;
+mod vpl_shares;
 pub mod vpl_spikes;
 pub mod vpl_walks;

@@ -5,7 +5,6 @@
 
 use std::sync::Arc;
 
-use clerestory::film::picture;
 use clerestory::gpu::Gpu;
 use clerestory::scene::Scene;
 use clerestory::techniques::instant_radiosity::Bound;
@@ -17,7 +16,7 @@ use clerestory::{Result, scene};
 
 use crate::experiments::findings::{Axes, Bound as Limit, Criterion, Findings, Repeats, Study, curves, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::pictures::finished;
+use crate::experiments::measures::pictures::{finished, mean};
 use crate::experiments::reference::short_name;
 use crate::timing::median;
 
@@ -139,9 +138,7 @@ fn brightness(context: &Context<'_>, rendering: &mut ManyLight, frames: u32) -> 
     let mut means = Vec::new();
     for seed in 0..context.pick(SEEDS[0], SEEDS[1]) {
         rendering.restart(seed)?;
-        let picture = finished(rendering, frames)?;
-        let values = picture.require(picture::RADIANCE)?.values();
-        means.push(values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len() as f64);
+        means.push(mean(&finished(rendering, frames)?)?);
     }
     Ok(Repeats(means))
 }

@@ -1,4 +1,4 @@
-//! Lights in the order of what they might bring: how many carry how much, what it costs to leave the others out, and how long an order may be kept.
+//! Lights in the order of what they might bring: how many carry how much (by `vpl_shares`), what it costs to leave the others out, and how long an order may be kept.
 //!
 //! Oracle: what all lights bring. Source of what this follows: the chapter on virtual light sources of a doctoral thesis on metals and reflections on graphics
 //! hardware, figures 6.4 to 6.8 and 6.10 to 6.13, and its digest's own figures for the same box.
@@ -8,15 +8,13 @@ use std::time::Instant;
 use clerestory::Result;
 use clerestory::film::png::Rgb8;
 use clerestory::techniques::instant_radiosity::selection::{
-    KeptOrder, LitPoint, Resorting, SurfaceLight, Survival, above_threshold, gather_in_order, lights_for_share,
-    order_by_potential, potential_contribution,
+    KeptOrder, Resorting, above_threshold, gather_in_order, order_by_potential,
 };
-use clerestory::transport::edge_bound::EdgeBound;
 use clerestory::transport::environment::luminance;
 use glam::DVec3;
 
-use super::unit_box::UnitBox;
-use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Repeats, Study, curves, rows};
+use super::vpl_shares::{self, Curve, Pixels, Rank, Share};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
 use crate::timing::median;
 
@@ -24,10 +22,6 @@ use crate::timing::median;
 const SIZE: [[u32; 2]; 2] = [[96, 60], [24, 15]];
 /// Walks and seeds whose shares are found.
 const WALKS: [(u32, u32); 4] = [(20, 0), (20, 1), (20, 2), (80, 3)];
-/// The published bound of distances is a tenth of the box.
-const BOUND: EdgeBound = EdgeBound::Distance(0.01);
-/// What the curve of shares is drawn of, %.
-const CURVE: [f64; 8] = [50.0, 60.0, 70.0, 80.0, 90.0, 95.0, 99.0, 100.0];
 /// Of the mean potential of a point's lights: the threshold of `MET-V3`.
 const THRESHOLD: f64 = 0.2;
 /// Panels of errors, and of points that were sorted.
@@ -35,26 +29,6 @@ const SHOWN: &str = "vpl-order.png";
 /// Error that is white in a panel.
 const WHITE: f64 = 0.2;
 
-rows! {
-    /// Lights of walks.
-    struct Share = "Shares of the potential" by [walks, seed] {
-        walks: u64 = "walks",
-        seed: u64 = "seed",
-        lights: u64 = "lights",
-        facing: f64 = "pairs that face each other (%)",
-        ninety: f64 = "lights for 90 % of the potential (%)",
-        eighty: f64 = "lights for 80 % (%)",
-        half: f64 = "potential of the strongest half (%)",
-    }
-}
-rows! {
-    /// Lights, by share.
-    struct Curve = "Cumulative potential" by [walks, share] {
-        walks: u64 = "walks",
-        share: f64 = "share of the potential (%)",
-        lights: f64 = "lights that carry it (%)",
-    }
-}
 rows! {
     /// A rule by which points take lights.
     struct Row = "Shadow rays and errors by rule" by [rule, share] {
@@ -78,15 +52,6 @@ rows! {
         time: Repeats = "time (s)",
         share: Repeats = "of the whole (%)",
         published: f64 = "published share (%)",
-    }
-}
-
-rows! {
-    /// A light of one point.
-    struct Rank = "Potential of one point's lights by rank" by [walks, rank] {
-        walks: u64 = "walks",
-        rank: u64 = "rank",
-        potential: f64 = "potential over that of the strongest",
     }
 }
 
@@ -146,26 +111,6 @@ const PERIODS: [(&str, f64); 6] = [
     (TENTH, 10.0),
     ("at every 20th point", 20.0),
     ("at every 50th point", 50.0),
-];
-
-fn mean_of(rows: &[&Share], of: fn(&Share) -> f64) -> Option<Measured> {
-    (!rows.is_empty()).then(|| Measured::exact(rows.iter().map(|row| of(row)).sum::<f64>() / rows.len() as f64))
-}
-
-const OF_SHARES: &[Criterion<Share>] = &[
-    Criterion::all(
-        "90 % of the potential in 45 to 49 % of the lights: mean (%)",
-        Bound::Between(45.0, 49.0),
-        |rows| mean_of(rows, |row| row.ninety),
-    ),
-    Criterion::all("80 % in 33 to 37 %: mean (%)", Bound::Between(33.0, 37.0), |rows| {
-        mean_of(rows, |row| row.eighty)
-    }),
-    Criterion::all(
-        "the strongest half carries about 90 %: mean (%)",
-        Bound::Between(88.0, 93.0),
-        |rows| mean_of(rows, |row| row.half),
-    ),
 ];
 
 impl Row {
@@ -279,13 +224,6 @@ const OF_PARTS: &[Criterion<Part>] = &[Criterion::each(
 )
 .among(|row| row.part == VISIBILITY)];
 
-/// A picture's points and lights.
-struct Pixels {
-    unit_box: UnitBox,
-    points: Vec<LitPoint>,
-    lights: Vec<SurfaceLight>,
-}
-
 /// What a rule brought, by point.
 struct Brought {
     plain: Vec<DVec3>,
@@ -297,17 +235,6 @@ struct Brought {
 }
 
 impl Pixels {
-    fn potentials(&self, point: &LitPoint, potentials: &mut Vec<DVec3>, keys: &mut Vec<f64>) {
-        potentials.clear();
-        potentials.extend(
-            self.lights
-                .iter()
-                .map(|light| potential_contribution(light, point, BOUND)),
-        );
-        keys.clear();
-        keys.extend(potentials.iter().map(|potential| luminance(*potential)));
-    }
-
     /// The picture by a rule, from the potential to the last shadow ray.
     fn picture(&self, rule: Rule, share: f64, saturation: f64) -> Brought {
         let mut kept = KeptOrder::new(match rule {
@@ -371,59 +298,6 @@ impl Pixels {
         std::hint::black_box(sum);
         seconds
     }
-
-    /// What each light might bring to the point in the middle of the picture, the strongest first, of those that might bring something.
-    fn ranks(&self, walks: u32, size: [u32; 2]) -> Vec<Rank> {
-        let (mut potentials, mut keys) = (Vec::new(), Vec::new());
-        let middle = (size[1] / 2 * size[0] + size[0] / 2) as usize;
-        self.potentials(&self.points[middle], &mut potentials, &mut keys);
-        let ordered = order_by_potential(&keys);
-        let ordered: Vec<f64> = ordered.iter().map(|light| keys[*light as usize]).collect();
-        let strongest = ordered.first().copied().unwrap_or(f64::NAN);
-        let bring = (1..).zip(ordered).filter(|(_, key)| *key > 0.0);
-        let rank = |(rank, key): (u64, f64)| Rank {
-            walks: walks.into(),
-            rank,
-            potential: key / strongest,
-        };
-        bring.map(rank).collect()
-    }
-
-    fn shares(&self, walks: u32, seed: u32) -> (Share, Vec<Curve>) {
-        let (mut potentials, mut keys) = (Vec::new(), Vec::new());
-        let (mut facing, mut half, mut carried) = (0.0, 0.0, [0.0; CURVE.len()]);
-        let n = self.lights.len() as f64;
-        for point in &self.points {
-            self.potentials(point, &mut potentials, &mut keys);
-            facing += keys.iter().filter(|key| **key > 0.0).count() as f64 / n;
-            let order = order_by_potential(&keys);
-            let strongest: f64 = order[..order.len() / 2].iter().map(|light| keys[*light as usize]).sum();
-            half += strongest / keys.iter().sum::<f64>();
-            for (sum, share) in carried.iter_mut().zip(CURVE) {
-                *sum += lights_for_share(&order, &keys, share / 100.0) as f64 / n;
-            }
-        }
-        let percent = |sum: f64| 100.0 * sum / self.points.len() as f64;
-        let of = |share: f64| {
-            let place = CURVE.iter().position(|other| *other == share);
-            place.map_or(f64::NAN, |place| percent(carried[place]))
-        };
-        let share = Share {
-            walks: walks.into(),
-            seed: seed.into(),
-            lights: self.lights.len() as u64,
-            facing: percent(facing),
-            ninety: of(90.0),
-            eighty: of(80.0),
-            half: percent(half),
-        };
-        let point = |(share, sum): (f64, f64)| Curve {
-            walks: walks.into(),
-            share,
-            lights: percent(sum),
-        };
-        (share, CURVE.into_iter().zip(carried).map(point).collect())
-    }
 }
 
 /// Relative error of each point, its sign kept; none of points without light.
@@ -462,17 +336,9 @@ fn panels([width, height]: [u32; 2], whole: &[DVec3], errors_of: &[&[DVec3]], so
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let size = context.pick(SIZE[0], SIZE[1]);
-        let pixels = |walks, seed| -> Result<Pixels> {
-            let unit_box = UnitBox::load()?;
-            Ok(Pixels {
-                points: unit_box.points(size)?,
-                lights: unit_box.lights(walks, seed, Survival::Roulette),
-                unit_box,
-            })
-        };
         let mut found = Self::default();
         for (walks, seed) in context.first(&WALKS, 2) {
-            let pixels = pixels(*walks, *seed)?;
+            let pixels = Pixels::of(size, *walks, *seed)?;
             let (share, mut curve) = pixels.shares(*walks, *seed);
             found.shares.push(share);
             if *seed == 0 {
@@ -480,7 +346,7 @@ impl Study for Found {
                 found.ranks = pixels.ranks(*walks, size);
             }
         }
-        let pixels = pixels(WALKS[0].0, WALKS[0].1)?;
+        let pixels = Pixels::of(size, WALKS[0].0, WALKS[0].1)?;
         let all = pixels.picture(Rule::All, 1.0, 0.0);
         let mut sorted: Vec<f64> = all.plain.iter().map(|radiance| luminance(*radiance)).collect();
         sorted.sort_by(f64::total_cmp);
@@ -556,26 +422,8 @@ impl Study for Found {
              the source has a twentieth: a longer period saves next to nothing and sends more rays, so that short ones are the best, and times are bounded by the rays that are left.",
         );
         rules
-            .and(Findings::of(&self.shares, OF_SHARES).curves(
-                "potential",
-                "Cumulative potential of a point's lights, the strongest first",
-                Axes::even("lights (%)", "share of the potential (%)", 100.0, (10, 10.0)),
-                curves(
-                    &self.curve,
-                    |row| format!("{} walks", row.walks),
-                    |row| (row.lights, row.share.into()),
-                ),
-            ))
-            .and(Findings::of(&self.ranks, &[]).long().curves(
-                "ranks",
-                "Potential of one point's lights by rank",
-                Axes::rates("rank", "potential over that of the strongest"),
-                curves(
-                    &self.ranks,
-                    |row| format!("{} walks", row.walks),
-                    |row| (row.rank as f64, row.potential.into()),
-                ),
-            ))
+            .and(vpl_shares::of_shares(&self.shares, &self.curve))
+            .and(vpl_shares::of_ranks(&self.ranks))
             .and(Findings::of(&self.parts, OF_PARTS).bars(
                 "parts",
                 "Where time goes, all lights (%)",
