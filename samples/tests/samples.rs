@@ -458,7 +458,7 @@ fn the_buffers_of_many_lights_are_shown_one_by_one() {
     assert!(floor > 2.0 * ceiling, "{ceiling} {floor}");
     let direct = shown("ggg", "direct light");
     let merged = shown("gggg", "indirect light before the filter");
-    let filtered = shown("ggggg", "indirect light behind the filter");
+    let filtered = shown("ggggg", "indirect light after the filter");
     let [direct, of_merged, of_filtered] = [&direct, &merged, &filtered].map(|picture| mean(picture, all, all)[0]);
     assert!(
         direct > 0.0 && (of_filtered / of_merged - 1.0).abs() < 0.3,

@@ -179,7 +179,7 @@ mod tests {
     use crate::scene::Geometry;
 
     const SLOPES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 1.0];
-    const EXPONENTS: [f64; 7] = [0.5, 1.5, 3.0, 5.0, 10.0, 50.0, 200.0];
+    const EXPONENTS: [f64; 4] = [5.0, 10.0, 50.0, 200.0];
     const TERMS: [Geometry; 3] = [Geometry::CookTorrance, Geometry::Simplified, Geometry::Smith];
 
     type OfDirection = Box<dyn Fn(DVec3) -> f64>;
@@ -202,14 +202,17 @@ mod tests {
             masking: Box::new(move |w| beckmann_g1(w, m)),
             masking_error: 4e-3,
         });
-        let exponents = EXPONENTS.map(|s| Distributed {
+        slopes.into_iter().chain(EXPONENTS.map(lobe)).collect()
+    }
+
+    fn lobe(s: f64) -> Distributed {
+        Distributed {
             name: format!("lobe {s}"),
             density: Box::new(move |h| cosine_lobe_d(h, s)),
             sampler: Box::new(move |u| cosine_lobe_sample(s, u)),
             masking: Box::new(move |w| cosine_lobe_g1(w, s)),
             masking_error: 1e-2,
-        });
-        slopes.into_iter().chain(exponents).collect()
+        }
     }
 
     fn direction(cos_theta: f64) -> DVec3 {
@@ -237,7 +240,9 @@ mod tests {
     fn masking_leaves_what_is_seen_from_a_direction() {
         const SIDE: u32 = 400;
         let at = |i: u32| (f64::from(i) + 0.5) / f64::from(SIDE);
-        for one in distributions() {
+        // Between exponents 0 and 5 the lobe is farthest from what its masking stands for.
+        let wide = [0.5, 1.5, 3.0].map(lobe);
+        for one in distributions().into_iter().chain(wide) {
             for cos_w in [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0] {
                 let w = direction(cos_w);
                 let area = (0..SIDE).map(|i| {

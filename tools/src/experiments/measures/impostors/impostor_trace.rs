@@ -128,7 +128,12 @@ fn pictures(context: &Context<'_>, game: &mut Game<'_>, frames: u32, periods: &[
         .collect();
     context.each(
         &cases,
-        |(searches, period)| format!("a map every {period} frames, {}", if *searches { SEARCHED } else { CLASSICAL }),
+        |(searches, period)| {
+            format!(
+                "a map every {period} frames, {}",
+                if *searches { SEARCHED } else { CLASSICAL }
+            )
+        },
         |(searches, period)| {
             let (mut sum, mut most, mut jump, mut rays) = (0.0, 0.0_f64, 0.0_f64, 0.0);
             let mut before: Option<Deviation> = None;

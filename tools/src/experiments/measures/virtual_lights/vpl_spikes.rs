@@ -79,13 +79,17 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.lost.into(),
     )
     .among(|row| row.distance == TWENTIETH),
-    Criterion::each("a tenth of the box loses 0.7 to 3 % of the light", Bound::Between(0.7, 3.0), |row: &Row| {
-        row.lost.into()
-    })
+    Criterion::each(
+        "a tenth of the box loses 0.7 to 3 % of the light",
+        Bound::Between(0.7, 3.0),
+        |row: &Row| row.lost.into(),
+    )
     .among(|row| row.distance == TENTH),
-    Criterion::each("a fifth of the box loses 2.2 to 5.4 % of the light", Bound::Between(2.2, 5.4), |row: &Row| {
-        row.lost.into()
-    })
+    Criterion::each(
+        "a fifth of the box loses 2.2 to 5.4 % of the light",
+        Bound::Between(2.2, 5.4),
+        |row: &Row| row.lost.into(),
+    )
     .among(|row| row.distance == FIFTH),
 ];
 
