@@ -45,7 +45,8 @@ fn compensated_bounds_agree_with_the_path_tracer() {
         add_point(&mut sphere, Vec3::new(0.3, -0.2, 0.1), Vec3::ONE);
         // Three decades about the bounds that would be chosen, and of looser ones more walks, each of whose lights is less of a spike. Distances in the room, too, where
         // edges of all lengths and angles meet.
-        let cases: [(_, &[(Bound, f32, u32)]); 2] = [
+        type Walked = (Bound, f32, u32);
+        let cases: [(_, &[Walked]); 2] = [
             (
                 room(),
                 &[

@@ -89,12 +89,7 @@ fn powers_of_spots_and_of_parallel_light_are_closed_forms() {
             outer: half_angle,
         };
         // 2π (1 − cos), of cones of 30°, 45° and, by faces of a cube, 60° and 80°; the falloff takes half a percent of the first.
-        for (degrees, expected, views) in [
-            (30.0f32, 0.8418, 1),
-            (45.0, 1.8403, 1),
-            (60.0, 3.1416, 6),
-            (80.0, 5.192, 6),
-        ] {
+        for (degrees, expected, views) in [(30.0f32, 0.8418, 1), (45.0, 1.8403, 1), (60.0, PI, 6), (80.0, 5.192, 6)] {
             let (sum, drawn) = sum_of(spot(degrees.to_radians()), 256);
             println!("{degrees}°: {sum} instead of {expected} by {drawn} views");
             assert!((sum / expected - 1.0).abs() < 0.01, "{degrees}: {sum}");

@@ -192,13 +192,16 @@ pub fn parts(context: &Context<'_>, gpu: &Gpu) -> Result<Vec<Part>> {
             let ways = at(*height)?;
             let rms = |values: &[f64]| relative_errors(values, &ways[0].1)[0];
             let classical = rms(&ways[1].1);
-            let part = |((way, values), (_, middle)): (&(String, Vec<f64>), &(String, Vec<f64>))| Part {
-                height: *height,
-                way: way.clone(),
-                light: mean(values),
-                of_middle: mean(values) / mean(middle),
-                rms: rms(values),
-                of_classical: rms(values) / classical,
+            let part = |(of_way, of_middle): (&(String, Vec<f64>), _)| {
+                let ((way, values), (_, middle)): (_, &(String, Vec<f64>)) = (of_way, of_middle);
+                Part {
+                    height: *height,
+                    way: way.clone(),
+                    light: mean(values),
+                    of_middle: mean(values) / mean(middle),
+                    rms: rms(values),
+                    of_classical: rms(values) / classical,
+                }
             };
             Ok(ways.iter().zip(&in_the_middle).map(part).collect())
         },

@@ -238,7 +238,7 @@ fn at_a_place(
         let (picture, skipped) = technique.picture()?;
         let report = compare(&picture, &reference, &CompareOptions::default())?;
         all.push(Shown {
-            way: *way,
+            way,
             picture,
             error: report.relative_mse.sqrt(),
             non_finite: skipped.total() + report.non_finite_test,

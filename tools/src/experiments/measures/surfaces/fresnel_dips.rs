@@ -12,6 +12,7 @@ use crate::metal_forms::{Way, cosines};
 /// The index whose curves are drawn for more and more extinction.
 const INDEX: f64 = 1.5;
 /// For extinctions from 0 on: reflectance at normal incidence, the least one, and the cosine of the least.
+#[expect(clippy::approx_constant, reason = "a published reflectance that looks like ln 2")]
 const DIPS: [[f64; 3]; 11] = [
     [0.0400, 0.0400, 1.0],
     [0.1724, 0.1724, 1.0],
