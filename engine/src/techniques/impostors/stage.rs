@@ -8,14 +8,13 @@ use super::capture::Captured;
 use super::settings::{ReflectionMethod, ReflectionSettings};
 use crate::Result;
 use crate::accel::Ray;
-use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL, REFLECTION_NONE, REFLECTION_REFRACTED,
 };
 use crate::gpu::shaders::sets::{ImpostorSet, WaveSet};
 use crate::gpu::shaders::techniques::impostors::impostor_reflect as kernel;
-use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
 use crate::maps::impostor::Impostor;
 use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
@@ -61,8 +60,6 @@ pub(super) struct Reflections {
     radiance: Buffer,
     side: u32,
     impostor: Option<Impostor>,
-    /// Stands where kernels without distances have none to read.
-    no_texels: TexelView,
     place: Vec3,
     tolerance: f32,
     triangles: Range<u32>,
@@ -119,7 +116,6 @@ impl Reflections {
             radiance: captured.radiance,
             side: captured.side,
             impostor,
-            no_texels: gpu.texels_with("no distances", Category::Light, vk::Format::R32_UINT, &[0u32])?,
             place,
             tolerance: settings.tolerance,
             triangles,
@@ -212,13 +208,13 @@ impl ReflectionStage<'_> {
         }
     }
 
-    /// Set 1; without distances another buffer stands in their place, which no kernel reads.
+    /// Set 1; without distances other buffers stand in their place, which no kernel reads.
     fn impostor_set(&self) -> ImpostorSet<'_> {
         let r = self.reflections;
         r.impostor.as_ref().map_or(
             ImpostorSet {
                 impostor_shapes: r.radiance.view(),
-                impostor_texels: &r.no_texels,
+                impostor_texels: self.scene.scene_set().scene_triangles,
             },
             Impostor::set,
         )

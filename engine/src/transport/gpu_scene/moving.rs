@@ -100,7 +100,7 @@ impl GpuScene {
             ..
         } = self.index.report;
         if self.index.traversal != DeviceTraversal::Wide {
-            let why = instead_because.map_or(String::new(), |why| format!(", which {why} ruled out"));
+            let why = instead_because.map_or(String::new(), |why| format!("; it stands for another, since {why}"));
             let cause = format!("cannot be refitted to objects that moved; wide can{why}");
             return Err(Error::setting("index", kind, cause));
         }
