@@ -118,6 +118,21 @@ bool walk_through_grid(uvec4 key, float end, inout float from) {
     return outcome != GRID_STOPPED || from >= end;
 }
 
+// What a query has of the ray of a place, and what the ray crosses at the surface that it meets.
+void begin_ray(uint slot, WalkState path, Hit hit, out Crossing crossing) {
+    crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (hit.triangle != NO_HIT) {
+        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
+    }
+    uint state = asking_state(path);
+    beam.origin = path.origin;
+    beam.direction = path.direction;
+    beam.start = status.rounds > 0u ? walk_medium_states[slot].start : 0.0;
+    beam.bounce = asking_bounce(path);
+    beam.classes = HAS_CLASSES ? push.classes[min(state, ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
+    beam.medium = medium_inside(crossing.interior, push.surrounding);
+}
+
 // Prepares the query of a place, and notes what comes of light from the surface; false where nothing is asked for on the way. Nor is anything where a quota stops the walk
 // through a grid (`walks`), which goes on another time (`goes_on`).
 bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool walks) {
@@ -126,23 +141,11 @@ bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool wa
     if ((push.states >> way_state & 1u) == 0u) {
         return false;
     }
-    MediumState state = MediumState(vec3(0.0), 0.0);
-    if (status.rounds > 0u) {
-        state = walk_medium_states[slot];
-    }
     Hit hit = load_hit(place);
-    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
-    if (hit.triangle != NO_HIT) {
-        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
-    }
-    beam.origin = path.origin;
-    beam.direction = path.direction;
-    beam.start = state.start;
-    beam.to = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start);
-    beam.from = max(state.start, 0.0);
-    beam.bounce = asking_bounce(path);
-    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
-    beam.medium = medium_inside(crossing.interior, push.surrounding);
+    Crossing crossing;
+    begin_ray(slot, path, hit, crossing);
+    beam.to = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, beam.start);
+    beam.from = max(beam.start, 0.0);
     beam.reach = vec3(FAR_AWAY);
     bool asks = (push.volume_states >> way_state & 1u) != 0u && beam.medium != NO_MEDIUM;
     if (beam.medium != NO_MEDIUM) {
@@ -152,7 +155,7 @@ bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool wa
     bool asked_before = false;
     if (HAS_GRIDS) {
         // Of a ray that has just begun nothing has been asked for; of a way that path_medium.comp goes on with, its surface, too.
-        float asked = state.start > 0.0 ? beam_asked[slot] : 0.0;
+        float asked = beam.start > 0.0 ? beam_asked[slot] : 0.0;
         asked_before = asked >= beam.to;
         beam.from = max(beam.from, asked);
         if (!asked_before && beam.medium != NO_MEDIUM && beam.m.has_grid != 0u) {
@@ -185,20 +188,11 @@ bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool wa
 // Prepares the query of a place again whose way is known.
 void resume_beam(uint slot, uint place, WalkState path) {
     BeamWay way = beam_ways[place];
-    Hit hit = load_hit(place);
-    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
-    if (hit.triangle != NO_HIT) {
-        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
-    }
-    beam.origin = path.origin;
-    beam.direction = path.direction;
-    beam.start = status.rounds > 0u ? walk_medium_states[slot].start : 0.0;
+    Crossing crossing;
+    begin_ray(slot, path, load_hit(place), crossing);
     beam.from = way.start;
     beam.to = way.end;
     beam.reach = way.reach;
-    beam.bounce = asking_bounce(path);
-    beam.classes = HAS_CLASSES ? push.classes[min(asking_state(path), ASKING_STATES - 1u)] >> CLASSES_IN_MEDIA_SHIFT : 0u;
-    beam.medium = medium_inside(crossing.interior, push.surrounding);
     beam.m = load_medium(beam.medium);
 }
 
