@@ -4,6 +4,7 @@ use super::queues::FORMS;
 use super::volume::{coloured, direct, endless, lit_box, uneven};
 use super::*;
 use clerestory::scene::{Medium, Phase};
+use clerestory::gpu::Category;
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
 use clerestory::techniques::photon_mapping::{GatherCounts, MapQueue, RayFetches};
 use clerestory_hard_cases::scenes::place_sparse_grid;
@@ -328,6 +329,31 @@ fn queues_and_packets_of_rays_are_made_for_media_alone() {
         assert!((kernels, queues) == (1, 0) && passes > 0);
         for form in [FORMS[1], FORMS[5]] {
             let (kernels, queued, queues) = of(&fog, form);
+#[test]
+fn points_and_rays_share_the_memory_of_their_queues() {
+    with_gpu(|gpu| {
+        // Bytes to work in that a queue adds.
+        let work = |scene: &Scene, queue| {
+            let settings = PhotonSettings {
+                queue,
+                ..asked(1 << 8, 0.1)
+            };
+            let before = gpu.memory_report().of(Category::Work);
+            let mapper = mapper(gpu, scene, &settings);
+            let bytes = gpu.memory_report().of(Category::Work) - before;
+            drop(mapper);
+            bytes
+        };
+        let (room, fog) = (builtin("builtin:cornell-box"), lit_box(coloured()));
+        for queue in [MapQueue::Compacted, MapQueue::Blocks] {
+            let [of_points, of_both] = [&room, &fog].map(|scene| work(scene, queue) - work(scene, MapQueue::Slots));
+            // A word a place at least.
+            assert!(of_points > 4 * PLACES, "{queue:?}: {of_points}");
+            assert_eq!(of_both, of_points, "{queue:?}");
+        }
+    });
+}
+
             assert_eq!((kernels, queues), (2, 2), "{form:?}");
             assert!(queued >= 3 && queued.is_multiple_of(3), "{form:?}: {queued} passes");
         }

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::map::PhotonMap;
 use super::path_classes::{ASKING_STATES, PathClasses};
-use super::queue::{AskSpec, Queue};
+use super::queue::{AskSpec, Queue, QueueMemory};
 use super::settings::{MapQuery, PhotonSettings};
 use super::volume::{Beam, BeamAsk, BeamStage, EventMap, SWEEPS_MAX};
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -154,7 +154,8 @@ impl Gather {
             counts_bounces: set.min_bounces() > least || set.max_bounces().is_some(),
             of_rays: false,
         };
-        let queue = Queue::new(gpu, scene, settings.queue, ask, slots)?;
+        let queues = QueueMemory::new(gpu, settings.queue, slots)?;
+        let queue = Queue::new(gpu, scene, &queues, ask)?;
         let nearest = settings.neighbors > 0;
         let has_media = scene.profile().media.any();
         // Both entry points have the same constants.
@@ -207,7 +208,7 @@ impl Gather {
             counts_bounces: ask.counts_bounces,
         };
         let beam = has_media
-            .then(|| Beam::new(gpu, scene, settings, asking, slots))
+            .then(|| Beam::new(gpu, scene, settings, asking, &queues, slots))
             .transpose()?;
         let bytes = size_of::<Counters>() as u64;
         let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
