@@ -2,9 +2,10 @@
 
 use super::queues::FORMS;
 use super::volume::{coloured, direct, endless, lit_box, uneven};
+use super::volume_truths::ESTIMATES;
 use super::*;
-use clerestory::scene::{Medium, Phase};
 use clerestory::gpu::Category;
+use clerestory::scene::{Medium, Phase};
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
 use clerestory::techniques::photon_mapping::{GatherCounts, MapQueue, RayFetches};
 use clerestory_hard_cases::scenes::place_sparse_grid;
@@ -16,6 +17,11 @@ use glam::DVec3;
 /// Set in the processes that only print their pictures' hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_VOLUME_QUEUE_HASH";
 const CHILD_TEST: &str = "volume_queues::prints_its_hash_when_asked";
+
+/// The same for one estimate, which the second variable names.
+const ESTIMATE_CHILD: &str = "CLERESTORY_TEST_PRINT_ESTIMATE_HASH";
+const ESTIMATE: &str = "CLERESTORY_TEST_ESTIMATE";
+const ESTIMATE_CHILD_TEST: &str = "volume_queues::prints_the_hash_of_an_estimate_when_asked";
 
 type Form = (MapQueue, MapQuery);
 
@@ -156,18 +162,6 @@ fn queues_and_packets_go_through_grids() {
     with_gpu(|gpu| {
         let all = expect_alike(gpu, &boxes(uneven(coloured())), &asked(1 << 13, 0.1), &FEW_FORMS);
         assert!(all[0].beams.photons > all[0].beams.queries && all[0].beams.queries > 0);
-    });
-}
-
-#[test]
-fn queues_and_packets_see_planes_and_beams() {
-    with_gpu(|gpu| {
-        let settings = PhotonSettings {
-            volume: VolumeEstimate::Planes,
-            ..asked(1 << 10, 0.05)
-        };
-        let all = expect_alike(gpu, &boxes(coloured()), &settings, &[FORMS[0], FORMS[5]]);
-        assert!(all[0].beams.rays > 0 && all[0].beams.photons > 0, "{:?}", all[0].beams);
     });
 }
 
@@ -329,6 +323,12 @@ fn queues_and_packets_of_rays_are_made_for_media_alone() {
         assert!((kernels, queues) == (1, 0) && passes > 0);
         for form in [FORMS[1], FORMS[5]] {
             let (kernels, queued, queues) = of(&fog, form);
+            assert_eq!((kernels, queues), (2, 2), "{form:?}");
+            assert!(queued >= 3 && queued.is_multiple_of(3), "{form:?}: {queued} passes");
+        }
+    });
+}
+
 #[test]
 fn points_and_rays_share_the_memory_of_their_queues() {
     with_gpu(|gpu| {
@@ -354,17 +354,75 @@ fn points_and_rays_share_the_memory_of_their_queues() {
     });
 }
 
-            assert_eq!((kernels, queues), (2, 2), "{form:?}");
-            assert!(queued >= 3 && queued.is_multiple_of(3), "{form:?}: {queued} passes");
-        }
-    });
-}
-
 #[test]
 fn queues_and_packets_never_show_on_any_number_of_threads() {
     let hash = |threads| hash_in_child(CHILD_TEST, CHILD, &[("LP_NUM_THREADS", threads)]);
     let truth = hash("1");
     assert_eq!(hash("2"), truth, "two threads");
+}
+
+/// Fails unless all six forms of an estimate make the same, in processes with one thread and with two.
+fn expect_the_same_on_threads(volume: VolumeEstimate) {
+    let name = format!("{volume:?}");
+    let hash = |threads| {
+        let variables = [("LP_NUM_THREADS", threads), (ESTIMATE, name.as_str())];
+        hash_in_child(ESTIMATE_CHILD_TEST, ESTIMATE_CHILD, &variables)
+    };
+    let truth = hash("1");
+    assert_eq!(hash("2"), truth, "two threads");
+}
+
+#[test]
+fn marches_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::March);
+}
+
+#[test]
+fn beams_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::Beams);
+}
+
+#[test]
+fn planes_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::Planes);
+}
+
+#[test]
+fn unified_estimates_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::Unified);
+}
+
+#[test]
+fn prints_the_hash_of_an_estimate_when_asked() {
+    if std::env::var_os(ESTIMATE_CHILD).is_none() {
+        return;
+    }
+    let name = std::env::var(ESTIMATE).unwrap();
+    let mut estimates = ESTIMATES.into_iter();
+    let volume = estimates.find(|volume| format!("{volume:?}") == name).unwrap();
+    let gpu = gpu();
+    let settings = PhotonSettings {
+        volume,
+        ..asked(1 << 10, 0.05)
+    };
+    let mut cases = vec![(boxes(coloured()), &FORMS[..])];
+    if !matches!(volume, VolumeEstimate::Beams | VolumeEstimate::Planes) {
+        cases.push((boxes(uneven(coloured())), &FEW_FORMS[..]));
+    }
+    let mut words: Vec<u32> = Vec::new();
+    for (scene, forms) in &cases {
+        let all = expect_alike(&gpu, scene, &settings, forms);
+        let beams = all[0].beams;
+        assert!(
+            beams.queries > 0 && beams.photons > 0 && all[0].stalls == 0,
+            "{beams:?}"
+        );
+        assert_eq!(beams.rays > 0, volume == VolumeEstimate::Planes, "{beams:?}");
+        words.extend_from_slice(&all[0].bits);
+        words.extend([beams.queries as u32, beams.photons as u32, beams.rays as u32]);
+    }
+    print_hash(words);
+    clerestory_tests::assert_no_messages(&gpu);
 }
 
 #[test]

@@ -11,7 +11,7 @@ use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::DVec3;
 
-const ESTIMATES: [VolumeEstimate; 5] = [
+pub(super) const ESTIMATES: [VolumeEstimate; 5] = [
     VolumeEstimate::Ray,
     VolumeEstimate::March,
     VolumeEstimate::Beams,

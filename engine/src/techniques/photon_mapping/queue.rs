@@ -339,7 +339,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
             "tests/tests/photon/queues.rs::blocks_need_no_subgroup_operations",
             "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
-            "tests/tests/photon/volume_queues.rs::queues_and_packets_see_planes_and_beams",
+            "tests/tests/photon/volume_queues.rs::planes_are_the_same_in_every_form_on_any_number_of_threads",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_never_show_on_any_number_of_threads",
         ],
         settings: &["queue"],
