@@ -727,6 +727,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/lights.rs::points_spots_and_suns_shine_as_they_should",
             "tests/tests/photon/lights.rs::lamps_and_skies_shine_as_they_should",
             "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
+            "tests/tests/photon/materials.rs::walls_of_which_normals_fan_out_light_the_floor",
             "tests/tests/photon/materials.rs::lights_inside_a_body_that_absorbs_shine_through_it",
             "engine/src/transport/gpu_scene/bodies.rs::lights_know_which_body_is_around_them",
             "engine/src/transport/gpu_scene/glow.rs::tries_find_places_as_often_as_they_should",
