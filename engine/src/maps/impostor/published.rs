@@ -10,7 +10,7 @@ use super::{ImpostorSettings, SearchMethod};
 /// Above it no crossing is passed over.
 const ANY: f32 = 0.999;
 
-/// What was published of a sphere's rays.
+/// What is known of a sphere's rays.
 #[derive(Debug, Clone, Copy)]
 pub struct Figures {
     /// Mean error of all rays, °.
@@ -87,7 +87,7 @@ pub struct Published {
     pub settings: ImpostorSettings,
     /// In so many layers of surfaces.
     pub layers: u32,
-    /// What was published of it.
+    /// What is known of it.
     pub figures: Figures,
 }
 
@@ -231,7 +231,7 @@ pub fn in_the_empty_room() -> Vec<Published> {
     all
 }
 
-/// Beside a box, and beside a pillar that the map's place sees.
+/// Beside a box, and beside a pillar.
 pub fn beside_obstacles() -> Vec<Published> {
     use SearchMethod::{Classical, FalsePosition, Hybrid, Mixed, SecantFromGuess, SecantFromPoint};
     let (of_box, of_pillar) = (ShinySphere::BOX, ShinySphere::P1);
