@@ -266,7 +266,7 @@ fn beams_have_the_six_constants() {
 #[test]
 fn ways_have_fewer_pieces_where_a_device_cannot_hold_all() {
     const PHOTONS: u32 = 1 << 15;
-    // Every way here has 32 pieces at first: twice what a buffer of this range holds.
+    // Most ways here have 32 pieces at first: more than a buffer of this range holds.
     const RANGE: u64 = 1 << 24;
     let of = |gpu: &Gpu| {
         let settings = PhotonSettings {
