@@ -40,12 +40,10 @@ fn error(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, truth: &Rendered) 
     const PASSES: u32 = 4;
     const SEEDS: u32 = 3;
     let own: f64 = truth.variance.iter().map(|variance| f64::from(*variance)).sum();
+    let mut mapper = mapper(gpu, scene, settings);
     let squared = (0..SEEDS).map(|seed| {
-        let settings = PhotonSettings {
-            seed,
-            ..settings.clone()
-        };
-        let found = photons(gpu, scene, &settings, PASSES);
+        mapper.restart(seed).unwrap_or_else(|error| panic!("{error}"));
+        let found = advance(&mut mapper, PASSES);
         let off = found.iter().zip(&truth.radiance);
         off.map(|(found, expected)| f64::from(found - expected).powi(2))
             .sum::<f64>()

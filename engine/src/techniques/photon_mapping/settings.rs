@@ -155,7 +155,7 @@ crate::settings! {
         /// (experiments `photon-queues` and `volume-queues`).
         pub query: MapQuery = MapQuery::Single;
         /// Invocations of queries serve every path under way, or only those that query the map in question, found by stream compaction or in blocks that
-        /// subgroups collect; changes pictures only as query does.
+        /// subgroups collect; changes pictures only as query does. Rays have each queue, single and in packets, with every estimate of volume.
         pub queue: MapQueue = MapQueue::Slots;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.

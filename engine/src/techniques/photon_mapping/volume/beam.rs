@@ -18,7 +18,7 @@ use crate::gpu::{
 };
 use crate::techniques::photon_mapping::gather::{GatherCounts, RayFetches};
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
-use crate::techniques::photon_mapping::queue::{AskSpec, Queue};
+use crate::techniques::photon_mapping::queue::{AskSpec, Queue, QueueMemory};
 use crate::techniques::photon_mapping::settings::{MapQuery, PhotonSettings};
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::{Places, WalkKey, stage_barrier};
@@ -83,7 +83,7 @@ pub(in crate::techniques::photon_mapping) struct BeamAsk<'a> {
 }
 
 impl Beam {
-    /// For up to `slots` eye paths at once.
+    /// For up to `slots` eye paths at once, with a queue in the memory `queues`.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -92,6 +92,7 @@ impl Beam {
         scene: &GpuScene,
         settings: &PhotonSettings,
         asking: BeamAsk<'_>,
+        queues: &QueueMemory,
         slots: u32,
     ) -> Result<Self> {
         let BeamAsk {
@@ -106,7 +107,7 @@ impl Beam {
             counts_bounces,
             of_rays: true,
         };
-        let queue = Queue::new(gpu, scene, settings.queue, queue, slots)?;
+        let queue = Queue::new(gpu, scene, queues, queue)?;
         // Both entry points have the same constants.
         macro_rules! spec {
             ($shader:ident, $queue:expr, $linear:expr) => {

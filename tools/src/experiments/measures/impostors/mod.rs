@@ -19,6 +19,5 @@ mod mirrored_rooms;
 pub mod moving_mirror;
 mod moving_pictures;
 pub mod published_lobe;
-pub mod published_searches;
 pub mod search_times;
 pub mod virtual_images;
