@@ -25,6 +25,7 @@ use crate::gpu::shaders::techniques::photon_mapping::{photon_append, photon_emit
 use crate::gpu::shaders::types::{self, Differentials};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
 use crate::gpu::{TexelView, Timings};
+use crate::transport::photon_share::placeless_distance2;
 use crate::transport::random::SamplerKind;
 use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
@@ -105,6 +106,8 @@ pub(in crate::techniques) struct PhotonPlan {
     pub stores_lights: bool,
     /// Photons are scattered by diffuse and glossy lobes alone: one specular scattering makes another path set.
     pub only_rough: bool,
+    /// They carry how far their light is from their first scattering, and records beside ways in media have it.
+    pub tells_lights: bool,
     pub stored: Stored,
 }
 
@@ -251,6 +254,8 @@ struct Kit {
     stored: Stored,
     /// Of a pass.
     photons: u32,
+    /// [`PhotonPlan::tells_lights`].
+    tells_lights: bool,
     append: Box<dyn Append>,
     emit: ComputePipeline<photon_emit::Kernel>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
@@ -317,6 +322,7 @@ impl PhotonTracer {
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
             only_rough: plan.only_rough,
+            tells_lights: plan.tells_lights,
             even_survival: plan.even_survival,
             has_media: profile.media.any(),
             has_classes: classes.is_some(),
@@ -370,6 +376,7 @@ impl PhotonTracer {
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
+                tells_lights: plan.tells_lights,
                 append,
             },
             gpu: gpu.clone(),
@@ -541,6 +548,16 @@ impl PhotonTracer {
 }
 
 impl Kit {
+    /// What photons of light without a place carry, m²; 0 where none tell their light.
+    fn placeless2(&self) -> f32 {
+        let [lower, upper] = self.scene.bounds().map(|corner| corner.as_dvec3());
+        if self.tells_lights {
+            placeless_distance2(lower, upper) as f32
+        } else {
+            0.0
+        }
+    }
+
     fn wave_set(&self) -> PhotonWave<'_> {
         PhotonWave {
             photon_counters: self.counters.view(),
@@ -564,6 +581,7 @@ impl PhotonStages<'_> {
             photons: kit.photons,
             share: share as f32,
             weight: (1.0 / share) as f32,
+            placeless2: kit.placeless2(),
         };
         recorder.pass("photon: emit", |pass| {
             let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
@@ -590,7 +608,7 @@ impl WalkStages for PhotonStages<'_> {
         }
         let Some(glow) = &kit.glow else { return Ok(()) };
         recorder.pass("photon: glow", |pass| {
-            glow.record(pass, wave, &kit.scene, &kit.differentials, self.key)
+            glow.record(pass, wave, &kit.scene, &kit.differentials, self.key, kit.placeless2())
         })
     }
 
