@@ -8,7 +8,8 @@
 //! eye / photons = d² / e²,  e² = n (π r² + 2 r sin θ / σ) / (16 π² p(xₖ)).
 //!
 //! They leave out the transmittances from the eye to xₖ, along the last flight of a beam and from the light to x₁, and take light and x₁ for ones that send and scatter evenly. So the shares are near to those of
-//! the balance heuristic, not the least noise there is; but the same function of a path for both, so that they sum to one for every path, and neither is biased by them. Eye paths do not find light that a mirror
+//! the balance heuristic, not the least noise there is; but the same function of a path for both, so that they sum to one for every path, and eye paths are not biased by them. A photon that is seen beside the
+//! ray has the share of its own way: that blurs as its light does, and fades as kernels shrink. Eye paths do not find light that a mirror
 //! scatters first, and light that no photon carries is theirs alone: that d² is 0, or not asked for. The distance d makes up for the 1/d² of light samples next to lights, whose variance has no bound.
 //!
 //! Sources: J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014, whose weights take whole densities; E. Veach, "Robust Monte Carlo Methods for

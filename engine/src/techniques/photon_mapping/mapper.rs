@@ -9,7 +9,7 @@
 //! directly where it first sees a diffuse surface or a medium scatters it, are the path tracer's; everything else that arrives there is the maps', one of
 //! surfaces and one of media. Where eye paths go on in media ([`PhotonSettings::volume_paths`]) they share what they find there with the map of media
 //! ([`photon_share`](crate::transport::photon_share)): all light that is seen first by a scattering in a medium, but that which a mirror scatters first, as caustics. Glossy lobes are never estimated from the map. Three kinds of light are the eye paths' alone, so that what they give beyond the first diffuse reflection
-//! is missing: unlit surfaces, emitters behind others with alpha in the same place, and slivers that light sampling leaves out. A photon
+//! is missing (unless eye paths go on in a medium): unlit surfaces, emitters behind others with alpha in the same place, and slivers that light sampling leaves out. A photon
 //! that starts inside a solid knows it from where it first meets the inside of one.
 //!
 //! Guarantees: deterministic in (seed, pass, photon) and (seed, pixel, sample), on any number of threads; scaling a scene, with lengths among

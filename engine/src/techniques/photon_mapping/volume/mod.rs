@@ -6,6 +6,10 @@
 //! Probabilistic Approach", ACM TOG 30(3), 2011; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light
 //! Transport", ACM TOG 36(4), 2017; J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014.
 //!
+//! What is seen first by a scattering in a medium is the eye paths' where it is the only one, unless the map has direct light, and else the photons'. With eye paths that go on
+//! ([`volume_paths`](super::PhotonSettings::volume_paths)) collisions, beams and eye paths share it, each path of light by weights that sum to one
+//! ([`photon_share`](crate::transport::photon_share)), but for what a mirror scatters first, which no light sample finds: that stays with collisions and beams.
+//!
 //! Nothing of it is made for scenes without media. Bias: kernels blur, and lose the light of media by walls and boundaries as far as they reach, since there are
 //! no events beyond; a thin wall lets them through. Both fade as kernels shrink. Planes have none: what they carry is unbiased, the rest comes by beams.
 
