@@ -158,6 +158,15 @@ void main() {
         out1(13u, plane_extinction(in3(23u), in3(20u)));
         break;
     }
+    case 10u: {  // shares of photons and of eye paths
+        float even2 = even_distance2(in1(6u), in1(7u), in1(8u), in1(9u), in1(10u), in_bits(11u) != 0u);
+        out1(0u, even2);
+        out1(1u, eye_share(in1(12u), even2));
+        out1(2u, photon_share(in1(12u), even2));
+        out1(3u, placeless_distance2(in3(0u), in3(3u)));
+        out1(4u, carried_distance2(in1(13u), in_bits(14u), in1(15u), in_bits(16u) != 0u));
+        break;
+    }
     case 7u: {  // footprints in media
         Differentials d = Differentials(in3(0u), in3(3u), in3(6u), in3(9u));
         EventKernelSettings s = EventKernelSettings(in1(12u), in1(13u), in1(14u), in1(15u), in1(16u));

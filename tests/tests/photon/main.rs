@@ -20,6 +20,7 @@ mod planes;
 mod queues;
 mod scale;
 mod settings;
+mod shared_paths;
 mod sphere;
 mod traps;
 mod unified;

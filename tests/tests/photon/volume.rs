@@ -474,26 +474,37 @@ fn kernels_from_footprints_agree_with_the_path_tracer() {
     });
 }
 
+/// The lit box with a lamp in the place of its light.
+pub(super) fn box_by_a_lamp(medium: Medium) -> Scene {
+    let mut scene = lit_box(medium);
+    scene.lights.clear();
+    let shining = scene.add_material(clerestory_tests::render::lamp(Vec3::splat(8.0)));
+    scene.place(cuboid(
+        "lamp",
+        shining,
+        Vec3::new(0.9, 0.2, -0.3),
+        Vec3::new(1.1, 0.6, 0.3),
+    ));
+    scene
+}
+
+/// That with a wall of glass between lamp and fog.
+pub(super) fn behind_a_pane(medium: Medium) -> Scene {
+    let mut scene = box_by_a_lamp(medium);
+    let glass = scene.add_material(Material::glass("pane", 1.5));
+    scene.place(cuboid(
+        "pane",
+        glass,
+        Vec3::new(0.6, -0.5, -0.6),
+        Vec3::new(0.7, 1.2, 0.8),
+    ));
+    scene
+}
+
 #[test]
 fn expressions_agree_with_the_path_tracer() {
     with_gpu(|gpu| {
-        // A wall of glass between the light and the fog.
-        let mut scene = lit_box(medium(2.0, 0.8, Phase::Isotropic));
-        let glass = scene.add_material(Material::glass("pane", 1.5));
-        scene.place(cuboid(
-            "pane",
-            glass,
-            Vec3::new(0.6, -0.5, -0.6),
-            Vec3::new(0.7, 1.2, 0.8),
-        ));
-        scene.lights.clear();
-        let shining = scene.add_material(clerestory_tests::render::lamp(Vec3::splat(8.0)));
-        scene.place(cuboid(
-            "lamp",
-            shining,
-            Vec3::new(0.9, 0.2, -0.3),
-            Vec3::new(1.1, 0.6, 0.3),
-        ));
+        let scene = behind_a_pane(medium(2.0, 0.8, Phase::Isotropic));
         for set in ["LS+VE", "L.*V.*E", "LS+DE"] {
             let settings = PhotonSettings {
                 volume_radius: 0.02,

@@ -22,6 +22,9 @@ use clerestory::transport::differentials::{
     guard_differentials, normal_derivatives, parallel_beam_differentials, reflect_differentials, refract_differentials,
     rough_reemission, roulette_differentials, transfer_differentials,
 };
+use clerestory::transport::photon_share::{
+    carried_distance2, even_distance2, eye_share, photon_share, placeless_distance2,
+};
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Case, Results, Tolerance, U, compare};
 use clerestory_tests::{twin_kernel, with_gpu};
@@ -652,6 +655,54 @@ fn beams_agree_with_their_twins() {
                 "{:?}",
                 case.0
             );
+        }
+    });
+}
+
+#[test]
+fn shares_with_eye_paths_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(42, |r| {
+            let corners = [4.0 * r.vector(), 4.0 * r.vector()];
+            list32(
+                &corners,
+                &[
+                    r.magnitude(-6, 6),
+                    r.unit(),
+                    r.magnitude(-4, 6),
+                    r.magnitude(-8, 2),
+                    r.magnitude(0, 24),
+                    code(r.below(2)),
+                    r.choose(&[0.0, 0.01, 1.0, 30.0]),
+                    r.choose(&[0.0, 2.5]),
+                    code(r.below(3)),
+                    r.range(0.0, 5.0),
+                    code(r.below(2)),
+                ],
+            )
+        });
+        let results = twin_photons(gpu, 10, &table, &[]);
+        for (case, result) in table.iter().zip(&results) {
+            let x = case.0.map(f64::from);
+            let is = |i: usize| case.0[i].to_bits() != 0;
+            let even2 = even_distance2(x[6], x[7], x[8], x[9], x[10], is(11));
+            let placeless2 = placeless_distance2(v3(&x, 0), v3(&x, 3));
+            let carried2 = carried_distance2(x[13], case.0[14].to_bits(), x[15], is(16));
+            let twins = [
+                even2,
+                eye_share(x[12], even2),
+                photon_share(x[12], even2),
+                placeless2,
+                carried2,
+            ];
+            for (i, twin) in twins.into_iter().enumerate() {
+                let found = f64::from(result.0[i]);
+                assert!(
+                    (found - twin).abs() <= 32.0 * U * twin,
+                    "{i}: {found} {twin}, {:?}",
+                    case.0
+                );
+            }
         }
     });
 }

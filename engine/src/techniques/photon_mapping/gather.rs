@@ -16,8 +16,8 @@ use super::settings::{MapQuery, PhotonSettings};
 use super::volume::{Beam, BeamAsk, BeamStage, EventMap};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{
-    LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_SET_DEAD, PATH_SET_STATE_BITS,
-    QUEUE_SLOTS,
+    LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS,
+    PATH_SET_DEAD, PATH_SET_LOBE_COUNT, PATH_SET_STATE_BITS, QUEUE_SLOTS,
 };
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, SOFTWARE_LOOP_CAP, wide_counter};
@@ -139,15 +139,22 @@ impl Gather {
         } else {
             Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
         };
+        // Eye paths that go on in a medium ask no more.
+        let floor = match settings.volume_paths && has_media {
+            true => states_before_rough(eye),
+            false => u32::MAX,
+        };
         let (gather_states, caustic_states) = match classes {
             Some(classes) => (classes.asking()[0], 0),
             None => gathering_states(settings, eye),
         };
+        let gather_states = gather_states & floor;
         let asking = BeamAsk {
             eye,
             classes,
             surface_states: gather_states,
             counts_bounces: ask.counts_bounces,
+            floor,
         };
         let beam = has_media
             .then(|| Beam::new(gpu, scene, settings, asking, &queues, slots))
@@ -254,6 +261,30 @@ fn gathering_states(settings: &PhotonSettings, eye: &PathSet) -> (u32, u32) {
         caustic |= u32::from(settings.final_gather && asks && goes_on) << state;
     }
     (gathering, caustic)
+}
+
+/// The states of eye paths that specular and glossy scattering alone leads to, a bit each.
+fn states_before_rough(eye: &PathSet) -> u32 {
+    let successors = eye.successors();
+    let mut reached = 1u32;
+    loop {
+        let before = reached;
+        for (state, word) in successors
+            .iter()
+            .enumerate()
+            .filter(|(state, _)| before >> state & 1 != 0)
+        {
+            for symbol in 0..PATH_SET_LOBE_COUNT {
+                let after = word >> (PATH_SET_STATE_BITS * symbol) & PATH_SET_DEAD;
+                if 1 << symbol & (LOBE_SPECULAR | LOBE_GLOSSY) != 0 && after != PATH_SET_DEAD {
+                    reached |= 1 << after;
+                }
+            }
+        }
+        if reached == before {
+            return reached;
+        }
+    }
 }
 
 /// Rows of the catalogue.

@@ -33,6 +33,7 @@ use crate::gpu::shaders::sets::PhotonWave;
 use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
 use crate::gpu::shaders::types::Differentials;
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, TexelView, Timings};
+use crate::transport::photon_share::placeless_distance2;
 use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
     WalkKey, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots, slots_of_device,
@@ -114,6 +115,8 @@ struct Kit {
     stored: Stored,
     /// Of a pass.
     photons: u32,
+    /// [`PhotonPlan::tells_lights`].
+    tells_lights: bool,
     append: Box<dyn Append>,
     emit: ComputePipeline<photon_emit::Kernel>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
@@ -167,6 +170,7 @@ impl PhotonTracer {
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
             only_rough: plan.only_rough,
+            tells_lights: plan.tells_lights,
             even_survival: plan.even_survival,
             has_media: profile.media.any(),
             has_classes: classes.is_some(),
@@ -220,6 +224,7 @@ impl PhotonTracer {
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
+                tells_lights: plan.tells_lights,
                 append,
             },
             gpu: gpu.clone(),
@@ -391,6 +396,16 @@ impl PhotonTracer {
 }
 
 impl Kit {
+    /// What photons of light without a place carry, m²; 0 where none tell their light.
+    fn placeless2(&self) -> f32 {
+        let [lower, upper] = self.scene.bounds().map(|corner| corner.as_dvec3());
+        if self.tells_lights {
+            placeless_distance2(lower, upper) as f32
+        } else {
+            0.0
+        }
+    }
+
     fn wave_set(&self) -> PhotonWave<'_> {
         PhotonWave {
             photon_counters: self.counters.view(),

@@ -63,5 +63,7 @@ pub(in crate::techniques) struct PhotonPlan {
     pub stores_lights: bool,
     /// Photons are scattered by diffuse and glossy lobes alone: one specular scattering makes another path set.
     pub only_rough: bool,
+    /// They carry how far their light is from their first scattering, and records beside ways in media have it.
+    pub tells_lights: bool,
     pub stored: Stored,
 }

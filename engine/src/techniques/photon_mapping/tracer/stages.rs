@@ -44,6 +44,7 @@ impl PhotonStages<'_> {
             photons: kit.photons,
             share: share as f32,
             weight: (1.0 / share) as f32,
+            placeless2: kit.placeless2(),
         };
         recorder.pass("photon: emit", |pass| {
             let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
@@ -70,7 +71,7 @@ impl WalkStages for PhotonStages<'_> {
         }
         let Some(glow) = &kit.glow else { return Ok(()) };
         recorder.pass("photon: glow", |pass| {
-            glow.record(pass, wave, &kit.scene, &kit.differentials, self.key)
+            glow.record(pass, wave, &kit.scene, &kit.differentials, self.key, kit.placeless2())
         })
     }
 

@@ -54,6 +54,8 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     states: u32,
     volume_states: u32,
     bounces: [u32; 2],
+    /// Of a pass.
+    photons: u32,
     /// [`PathClasses::asks`].
     classes: [u32; ASKING_STATES],
 }
@@ -80,6 +82,8 @@ pub(in crate::techniques::photon_mapping) struct BeamAsk<'a> {
     pub surface_states: u32,
     /// The path set bounds the number of scatterings.
     pub counts_bounces: bool,
+    /// States of eye paths from which on maps are asked at all, a bit each: others go on behind a scattering in a medium.
+    pub floor: u32,
 }
 
 impl Beam {
@@ -100,6 +104,7 @@ impl Beam {
             classes,
             surface_states,
             counts_bounces,
+            floor,
         } = asking;
         let profile = scene.profile();
         let queue = AskSpec {
@@ -123,6 +128,7 @@ impl Beam {
                     beams: settings.volume.stores_ways(),
                     planes: settings.volume.stores_planes(),
                     points: settings.volume.stores_points(),
+                    tells_lights: settings.volume_paths,
                     compact_quota: settings.query_quota.min(BEAM_QUOTA),
                     count_fetches: settings.count_fetches,
                     counts_bounces,
@@ -159,7 +165,7 @@ impl Beam {
         let volume_states = match classes {
             Some(classes) => classes.asking()[1],
             None if settings.direct_photons => surface_states,
-            None => states_that_go_on_by(eye, LOBE_VOLUME.trailing_zeros()),
+            None => states_that_go_on_by(eye, LOBE_VOLUME.trailing_zeros()) & floor,
         };
         Ok(Self {
             gpu: gpu.clone(),
@@ -185,6 +191,7 @@ impl Beam {
                 settings.path_set.min_bounces(),
                 settings.path_set.max_bounces().unwrap_or(u32::MAX),
             ],
+            photons: settings.photons,
             classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
         })
     }
@@ -261,6 +268,7 @@ impl BeamStage<'_> {
             scale: self.scale,
             radius: self.radius,
             plane_weight: 1.0 / self.plane_share,
+            photons: self.beam.photons as f32,
             classes: self.beam.classes,
             ..Default::default()
         }
