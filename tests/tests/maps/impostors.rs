@@ -6,7 +6,8 @@ use clerestory::gpu::{BufferDesc, Category, Gpu, GpuOptions, Lesser};
 use clerestory::maps::impostor::layouts::{ImpostorLayout, ImpostorLayouts};
 use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
 use clerestory::maps::impostor::{
-    Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, SearchMethod,
+    Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, ImpostorSurface,
+    ImpostorTexels, SearchMethod,
 };
 use clerestory::maps::{MapImage, Parametrization, Texel};
 use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
@@ -310,7 +311,7 @@ fn rays_that_are_none_find_nothing_in_the_kernel() {
 fn the_sky_is_seen_in_the_rays_own_direction() {
     with_gpu(|gpu| {
         let floor = |d: DVec3| {
-            let below = (d.y < -1e-3).then(|| clerestory::maps::impostor::ImpostorSurface {
+            let below = (d.y < -1e-3).then(|| ImpostorSurface {
                 distance: -1.0 / d.y,
                 normal: DVec3::Y,
             });
@@ -338,18 +339,64 @@ fn the_sky_is_seen_in_the_rays_own_direction() {
     });
 }
 
-/// Four bytes a texel and layer, as many again for normals that were asked for, and none for those that were not.
+/// Planes that are stored and those that each look-up makes of a normal: rays find the same but where rounding chooses the texel, in a room and under an empty sky.
+#[test]
+fn texels_of_planes_and_of_normals_find_the_same() {
+    with_gpu(|gpu| {
+        let sphere = ShinySphere::BOX;
+        let rays = sphere.rays(40, None);
+        let settings = ImpostorSettings::default();
+        for (map, is_open) in [(MAPS[0], false), (MAPS[1], true)] {
+            let image = ImpostorImage::from_fn(map, map.size_for(6.0 * 24.0 * 24.0), 1, true, |d| {
+                if is_open && d.y > 0.4 {
+                    Vec::new()
+                } else {
+                    sphere.room.surfaces(d)
+                }
+            });
+            let image = image.unwrap();
+            let [planes, normals] = [ImpostorTexels::Planes, ImpostorTexels::Normals].map(|texels| {
+                let impostor = Impostor::with_texels(gpu, &image, texels).unwrap();
+                impostor.search(&rays, &settings).unwrap()
+            });
+            for (hits, texels) in [(&planes, "planes"), (&normals, "normals")] {
+                let off = share_that_differs(&image, &rays, hits, &settings);
+                println!("{map}, {texels}: {:.2} % differ from the twin", 100.0 * off);
+                assert!(off < 0.02, "{map}, {texels}: {off}");
+            }
+            let differs = |(a, b): (&ImpostorHit, &ImpostorHit)| {
+                (a.direction - b.direction).length() > 1e-4 || (a.distance - b.distance).abs() > 1e-4 * b.distance
+            };
+            let count = planes.iter().zip(&normals).filter(|pair| differs(*pair)).count();
+            assert!(50 * count < rays.len(), "{map}: {count} of {}", rays.len());
+            let sky = |hits: &[ImpostorHit]| hits.iter().filter(|hit| hit.distance > 100.0).count();
+            assert!((sky(&planes) > 0) == is_open && (sky(&normals) > 0) == is_open, "{map}");
+        }
+        // Each kind has kernels of its own.
+        let image = ImpostorImage::from_fn(MAPS[0], UVec2::splat(8), 1, true, |d| sphere.room.surfaces(d)).unwrap();
+        let [planes, normals] = [ImpostorTexels::Planes, ImpostorTexels::Normals]
+            .map(|texels| Impostor::with_texels(gpu, &image, texels).unwrap());
+        let of_planes = ImpostorSearch::new(gpu, &planes, &settings).unwrap();
+        let refused = of_planes.search_timed(&normals, &rays).unwrap_err().to_string();
+        assert!(refused.contains("what texels hold"), "{refused}");
+    });
+}
+
+/// Four bytes a texel and layer for distances alone; where normals were asked for, sixteen for planes or eight for normals.
 #[test]
 fn distances_have_a_buffer_of_their_own() {
     with_gpu(|gpu| {
-        let bytes = |layers: u32, with_normals: bool| {
+        let bytes = |layers: u32, with_normals: bool, texels: ImpostorTexels| {
             let image = ImpostorImage::from_fn(Parametrization::Cube, UVec2::splat(16), layers, with_normals, |d| {
                 BoxRoom::BOX.surfaces(d)
             });
-            Impostor::new(gpu, &image.unwrap()).unwrap().bytes()
+            Impostor::with_texels(gpu, &image.unwrap(), texels).unwrap().bytes()
         };
-        assert_eq!(bytes(1, false), 6 * 16 * 16 * 4);
-        assert_eq!(bytes(3, true), 2 * 3 * 6 * 16 * 16 * 4);
+        for texels in [ImpostorTexels::Planes, ImpostorTexels::Normals] {
+            assert_eq!(bytes(1, false, texels), 6 * 16 * 16 * 4, "{texels:?}");
+        }
+        assert_eq!(bytes(3, true, ImpostorTexels::Planes), 4 * 3 * 6 * 16 * 16 * 4);
+        assert_eq!(bytes(3, true, ImpostorTexels::Normals), 2 * 3 * 6 * 16 * 16 * 4);
     });
 }
 
