@@ -4,6 +4,8 @@
 #ifndef CLERESTORY_MAPS_IMPOSTOR_GLSL
 #define CLERESTORY_MAPS_IMPOSTOR_GLSL
 
+#extension GL_EXT_control_flow_attributes : require
+
 #include "maps/impostor_step.glsl"
 #include "maps/proxy.glsl"
 
@@ -59,7 +61,8 @@ float impostor_ratio(uint layer, vec3 x, vec3 r, float d) {
     return impostor_relative(layer, l, length(l));
 }
 
-// By secants and brackets; `farthest` is the greatest distance of a surface.
+// By secants and brackets; `farthest` is the greatest distance of a surface. Steps stay loops: llvmpipe takes longer for three of them in
+// a row than for four in a loop, and to compile them.
 float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     float reach = length(x) + farthest;
     float far = 1.0 / impostor_look_up(layer, r, 1.0);
@@ -70,7 +73,7 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     float d;
     if (IMPOSTOR_METHOD == IMPOSTOR_FIXED_POINT) {
         d = min(sphere_proxy(x, r, far), reach);
-        for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
+        [[dont_unroll]] for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
             vec3 l = x + d * r;
             float size = length(l);
             float g = impostor_relative(layer, l, size);
@@ -96,7 +99,7 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     vec2 under = last;
     vec2 over = last;
     d = clamp(begin + impostor_step(last, false, last, far), 0.0, reach);
-    for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
+    [[dont_unroll]] for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
         vec2 guess = vec2(d, impostor_ratio(layer, x, r, d));
         vec2 other = last;
         bool has_other = true;

@@ -122,7 +122,7 @@ fn layouts_show_the_same_radiance() {
     });
 }
 
-/// Three layers of squares, a texel more than a buffer may have.
+/// Three layers of squares, a texel more than a buffer may have, whatever texels hold.
 #[test]
 fn distances_beyond_a_texel_buffer_are_refused() {
     const LAYERS: u32 = 3;
@@ -136,12 +136,20 @@ fn distances_beyond_a_texel_buffer_are_refused() {
         ..GpuOptions::default()
     });
     let map = Parametrization::OctahedronQuadratic;
-    let of = |layers| {
+    let of = |layers: u32, with_normals: bool| {
         let count = (layers * SIDE * SIDE) as usize;
-        ImpostorImage::new(map, UVec2::splat(SIDE), layers, vec![1.0; count], None).unwrap()
+        let normals = vec![DVec3::Z; count];
+        let normals = with_normals.then_some(normals.as_slice());
+        ImpostorImage::new(map, UVec2::splat(SIDE), layers, vec![1.0; count], normals).unwrap()
     };
-    assert!(Impostor::new(&gpu, &of(LAYERS - 1)).is_ok());
-    let error = Impostor::new(&gpu, &of(LAYERS)).unwrap_err();
+    for texels in [ImpostorTexels::Planes, ImpostorTexels::Normals] {
+        let upload = |layers| Impostor::with_texels(&gpu, &of(layers, true), texels);
+        assert!(upload(LAYERS - 1).is_ok(), "{texels:?}");
+        let error = upload(LAYERS).unwrap_err().to_string();
+        assert!(error.contains("maxTexelBufferElements"), "{texels:?}: {error}");
+    }
+    assert!(Impostor::new(&gpu, &of(LAYERS - 1, false)).is_ok());
+    let error = Impostor::new(&gpu, &of(LAYERS, false)).unwrap_err();
     let Error::LimitExceeded {
         name,
         value,
