@@ -7,16 +7,14 @@ const uint CUBE_FACES = 6u;
 // In [-1, 1]^2 of a face, of a direction of any length. Of equal components z counts before y before x.
 vec2 cube_encode(vec3 d, out uint face) {
     vec3 a = abs(d);
-    if (a.z >= a.x && a.z >= a.y) {
-        face = d.z < 0.0 ? 5u : 4u;
-        return vec2(d.x / d.z, -d.y / a.z);
-    }
-    if (a.y >= a.x) {
-        face = d.y < 0.0 ? 3u : 2u;
-        return vec2(d.x / a.y, d.z / d.y);
-    }
-    face = d.x < 0.0 ? 1u : 0u;
-    return vec2(-d.z / d.x, -d.y / a.x);
+    bool is_z = a.z >= a.x && a.z >= a.y;
+    bool is_y = !is_z && a.y >= a.x;
+    float along = is_z ? d.z : is_y ? d.y : d.x;
+    float side = along < 0.0 ? -1.0 : 1.0;
+    face = (is_z ? 4u : is_y ? 2u : 0u) + (along < 0.0 ? 1u : 0u);
+    // Chosen before it is divided: where lanes choose differently, all of them pay for each division.
+    vec2 aside = is_z ? vec2(side * d.x, -d.y) : is_y ? vec2(d.x, side * d.z) : vec2(-side * d.z, -d.y);
+    return aside / abs(along);
 }
 
 // The point of a face's coordinates in space, at a height along its normal.

@@ -1,13 +1,18 @@
 // Searches for what a ray meets, by a map that holds distances. Sources, bias and guarantees: maps/impostor/mod.rs; twin:
-// maps/impostor/search.rs. Expects `float impostor_distance(uint layer, vec3 v)`, the distance to a layer's surface in a unit direction.
+// maps/impostor/search.rs. Expects `float impostor_look_up(uint layer, vec3 l, float size)`, the length `size` of l over the distance to a layer's surface in the
+// direction of l; of a length of 0 that is 0, and l any direction.
 #ifndef CLERESTORY_MAPS_IMPOSTOR_GLSL
 #define CLERESTORY_MAPS_IMPOSTOR_GLSL
+
+#extension GL_EXT_control_flow_attributes : require
 
 #include "maps/impostor_step.glsl"
 #include "maps/proxy.glsl"
 
 // What stands where there is no surface: finite, so that ratios of it are.
 const float IMPOSTOR_NOTHING = 1e16;
+// One over it.
+const float IMPOSTOR_NOTHING_INVERSE = 1e-16;
 // Layers of surfaces at most.
 const uint IMPOSTOR_LAYERS_MAX = 8u;
 // By how much the squared length of a direction may be off 1.
@@ -44,17 +49,23 @@ struct ImpostorHit {
     uint layer;
 };
 
+// The same as `impostor_look_up` for any l: at the map's place, where there is no direction, it looks up some. Asked is l and not its length, for which no look-up
+// has to wait.
+float impostor_relative(uint layer, vec3 l, float size) {
+    return impostor_look_up(layer, vec3(l.xy, l == vec3(0.0) ? 1.0 : l.z), size);
+}
+
 // |x + d r| over the distance that the map has there: below 1 in front of the surface.
 float impostor_ratio(uint layer, vec3 x, vec3 r, float d) {
     vec3 l = x + d * r;
-    float size = length(l);
-    return size > 0.0 ? size / impostor_distance(layer, l / size) : 0.0;
+    return impostor_relative(layer, l, length(l));
 }
 
-// By secants and brackets; `farthest` is the greatest distance of a surface.
+// By secants and brackets; `farthest` is the greatest distance of a surface. Steps stay loops: llvmpipe takes longer for three of them in
+// a row than for four in a loop, and to compile them.
 float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     float reach = length(x) + farthest;
-    float far = impostor_distance(layer, r);
+    float far = 1.0 / impostor_look_up(layer, r, 1.0);
     float across = clamp(far - dot(r, x), 0.0, reach);
     if (IMPOSTOR_METHOD == IMPOSTOR_PERPENDICULAR) {
         return across;
@@ -62,10 +73,11 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     float d;
     if (IMPOSTOR_METHOD == IMPOSTOR_FIXED_POINT) {
         d = min(sphere_proxy(x, r, far), reach);
-        for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
+        [[dont_unroll]] for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
             vec3 l = x + d * r;
             float size = length(l);
-            d = min(sphere_proxy(x, r, size > 0.0 ? impostor_distance(layer, l / size) : far), reach);
+            float g = impostor_relative(layer, l, size);
+            d = min(sphere_proxy(x, r, size > 0.0 ? size / g : far), reach);
         }
         return d;
     }
@@ -87,7 +99,7 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     vec2 under = last;
     vec2 over = last;
     d = clamp(begin + impostor_step(last, false, last, far), 0.0, reach);
-    for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
+    [[dont_unroll]] for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
         vec2 guess = vec2(d, impostor_ratio(layer, x, r, d));
         vec2 other = last;
         bool has_other = true;
@@ -149,9 +161,10 @@ float impostor_by_march(uint layer, vec3 x, vec3 r, vec2 extent, float tolerance
     return !is_found && g_low < 1.0 ? end : best;
 }
 
-// Of the unit direction r; others find nothing, nor does an x as far as where there is nothing.
-ImpostorHit impostor_search(vec3 x, vec3 r, vec2 extent, float tolerance) {
+// Of the unit direction r; others find nothing, nor does an x as far as where there is nothing. The direction that is found has the length `size`.
+ImpostorHit impostor_search(vec3 x, vec3 r, vec2 extent, float tolerance, out float size) {
     ImpostorHit best = ImpostorHit(vec3(0.0), 0.0, 1.0, 0u);
+    size = 1.0;
     bool is_ray = abs(dot(r, r) - 1.0) < IMPOSTOR_UNIT && all(lessThan(abs(x), vec3(IMPOSTOR_NOTHING)));
     if (!is_ray) {
         return best;
@@ -164,24 +177,37 @@ ImpostorHit impostor_search(vec3 x, vec3 r, vec2 extent, float tolerance) {
         float d = IMPOSTOR_METHOD == IMPOSTOR_MARCH ? impostor_by_march(layer, x, r, extent, tolerance)
                                                     : impostor_by_steps(layer, x, r, extent.y);
         vec3 l = x + d * r;
-        float size = length(l);
-        vec3 v = size > 0.0 ? l / size : r;
-        float distance = impostor_distance(layer, v);
-        // 1 at the map's place itself.
-        ImpostorHit hit = ImpostorHit(v, d, abs(1.0 - size / distance), layer);
-        if (IMPOSTOR_IS_OPEN && size > 0.0 && distance >= IMPOSTOR_NOTHING) {
-            // The sky in the first layer; in others no further surface.
-            hit = ImpostorHit(r, IMPOSTOR_NOTHING, layer == 0u ? 0.0 : 1.0, layer);
+        float squared = dot(l, l);
+        float length_of_l = sqrt(squared);
+        float g = impostor_relative(layer, l, length_of_l);
+        bool is_sky = IMPOSTOR_IS_OPEN && squared > 0.0 && g <= IMPOSTOR_NOTHING_INVERSE * length_of_l;
+        // The ray's own in the sky, and at the map's place itself, where the residual is 1.
+        bool is_own = is_sky || squared == 0.0;
+        ImpostorHit hit = ImpostorHit(is_own ? r : l, d, abs(1.0 - g), layer);
+        if (is_sky) {
+            // Seen in the first layer; in others no further surface.
+            hit.distance = IMPOSTOR_NOTHING;
+            hit.residual = layer == 0u ? 0.0 : 1.0;
         }
         bool is_surface = hit.residual < tolerance && hit.distance < IMPOSTOR_NOTHING && hit.distance > 0.0;
-        bool is_better = is_surface ? !is_found || hit.distance < best.distance
+        bool is_nearer = is_surface ? !is_found || hit.distance < best.distance
                                     : !is_found && (layer == 0u || hit.residual < best.residual);
-        if (is_better) {
+        // Of one layer it is all there is, and whoever reads no residual needs none.
+        if (IMPOSTOR_LAYERS == 1u || is_nearer) {
             best = hit;
+            size = is_own ? 1.0 : length_of_l;
         }
         is_found = is_found || is_surface;
     }
     return best;
+}
+
+// The same with a unit direction.
+ImpostorHit impostor_search(vec3 x, vec3 r, vec2 extent, float tolerance) {
+    float size;
+    ImpostorHit hit = impostor_search(x, r, extent, tolerance, size);
+    hit.direction *= 1.0 / size;
+    return hit;
 }
 
 #endif

@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 #include "invocation.glsl"
 #include "maps/directional_map.glsl"
 
-// Whether distances are the fourth numbers of texels, instead of in a buffer of their own.
+// Whether one over the distance is the fourth number of a texel, instead of in a buffer of its own.
 layout(constant_id = 135) const bool IMPOSTOR_PACKED = false;
 
 layout(push_constant, scalar) uniform Push {
@@ -26,33 +26,34 @@ struct ImpostorQuery {
 };
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { ImpostorQuery queries[]; };
-// Radiance, and the distance.
+// Radiance, and one over the distance.
 layout(set = 0, binding = 1) uniform textureBuffer texels;
-layout(set = 0, binding = 2) uniform textureBuffer distances;
+layout(set = 0, binding = 2) uniform textureBuffer inverses;
 layout(set = 0, binding = 3, scalar) restrict writeonly buffer Values { vec3 values[]; };
 
-float impostor_distance(uint layer, vec3 v);
+float impostor_look_up(uint layer, vec3 l, float size);
 
 #include "maps/impostor.glsl"
 
-// The texel that shows a unit direction.
-int impostor_texel(vec3 v) {
+// The texel that shows a direction of any length.
+int impostor_texel(vec3 l, float size) {
     uint face;
-    vec2 uv = directional_encode(v, face);
+    vec2 uv = directional_encode(DIRECTIONAL_KIND == DIRECTIONAL_EQUAL_AREA && size > 0.0 ? l / size : l, face);
     ivec2 p = clamp(ivec2(uv * vec2(push.size)), ivec2(0), push.size - 1);
     return (int(face) * push.size.y + p.y) * push.size.x + p.x;
 }
 
-float impostor_distance(uint layer, vec3 v) {
-    int texel = impostor_texel(v);
-    return IMPOSTOR_PACKED ? texelFetch(texels, texel).w : texelFetch(distances, texel).x;
+float impostor_look_up(uint layer, vec3 l, float size) {
+    int texel = impostor_texel(l, size);
+    return size * (IMPOSTOR_PACKED ? texelFetch(texels, texel).w : texelFetch(inverses, texel).x);
 }
 
 void main() {
     uint i = invocation_index();
     if (i < push.count) {
         ImpostorQuery query = queries[i];
-        ImpostorHit hit = impostor_search(query.origin, query.direction, push.extent, push.tolerance);
-        values[i] = texelFetch(texels, impostor_texel(hit.direction)).rgb;
+        float size;
+        ImpostorHit hit = impostor_search(query.origin, query.direction, push.extent, push.tolerance, size);
+        values[i] = texelFetch(texels, impostor_texel(hit.direction, size)).rgb;
     }
 }

@@ -26,6 +26,6 @@ void main() {
     uint i = invocation_index();
     if (i < push.count) {
         ImpostorQuery query = queries[i];
-        hits[i] = impostor_search(query.origin, query.direction, impostor_shapes[0].extent, push.tolerance);
+        hits[i] = impostor_search(query.origin, query.direction, impostor_extent, push.tolerance);
     }
 }

@@ -7,8 +7,11 @@
 
 // descriptor set 1: ImpostorSet
 
-// Whether there are normals, so that a texel's distance goes on along its plane.
-layout(constant_id = 134) const bool IMPOSTOR_PLANES = false;
+// What a texel holds.
+const uint IMPOSTOR_HOLDS_DISTANCE = 0u;  // one over the distance
+const uint IMPOSTOR_HOLDS_NORMAL = 1u;    // and the normal, packed, so that the distance goes on along the plane
+const uint IMPOSTOR_HOLDS_PLANE = 2u;     // the plane as look-ups take it: impostor_plane
+layout(constant_id = 134) const uint IMPOSTOR_HOLDS = IMPOSTOR_HOLDS_DISTANCE;
 
 // Texels of a layer of the map, and the least and greatest distance of a surface.
 struct ImpostorShape {
@@ -17,31 +20,36 @@ struct ImpostorShape {
 };
 
 layout(set = 1, binding = 0, scalar) restrict readonly buffer ImpostorShapes { ImpostorShape impostor_shapes[]; };
-// Layer of surfaces by layer, each layer by layer of the map, row by row: the distance, and the normal where there are normals.
+// Layer of surfaces by layer, each layer by layer of the map, row by row.
 layout(set = 1, binding = 1) uniform utextureBuffer impostor_texels;
 
-float impostor_distance(uint layer, vec3 v);
+float impostor_look_up(uint layer, vec3 l, float size);
 
 #include "maps/impostor.glsl"
 
-// Read once, for all steps.
+// Read once, for all steps, and before lanes part: a software driver loads what they share once.
 ivec2 impostor_size = impostor_shapes[0].size;
+vec2 impostor_extent = impostor_shapes[0].extent;
 
-float impostor_distance(uint layer, vec3 v) {
+float impostor_look_up(uint layer, vec3 l, float size) {
     uint face;
-    vec2 uv = directional_encode(v, face);
-    ivec2 p = clamp(ivec2(uv * vec2(impostor_size)), ivec2(0), impostor_size - 1);
+    // The other maps' directions may have any length.
+    vec2 uv = directional_encode(DIRECTIONAL_KIND == DIRECTIONAL_EQUAL_AREA && size > 0.0 ? l / size : l, face);
+    ivec2 p = min(ivec2(uv * vec2(impostor_size)), impostor_size - 1);
     bool is_cube = DIRECTIONAL_KIND == DIRECTIONAL_CUBE;
     int row = int(layer * (is_cube ? CUBE_FACES : 1u) + face) * impostor_size.y + p.y;
-    uvec2 texel = texelFetch(impostor_texels, row * impostor_size.x + p.x).xy;
-    float distance = uintBitsToFloat(texel.x);
-    if (IMPOSTOR_PLANES && (!IMPOSTOR_IS_OPEN || distance < IMPOSTOR_NOTHING)) {
+    uvec4 texel = texelFetch(impostor_texels, row * impostor_size.x + p.x);
+    if (IMPOSTOR_HOLDS == IMPOSTOR_HOLDS_PLANE) {
+        return impostor_plane_ratio(uintBitsToFloat(texel), l, size);
+    }
+    float inverse = uintBitsToFloat(texel.x);
+    if (IMPOSTOR_HOLDS == IMPOSTOR_HOLDS_NORMAL && (!IMPOSTOR_IS_OPEN || inverse > IMPOSTOR_NOTHING_INVERSE)) {
         vec2 centre = (vec2(p) + 0.5) / vec2(impostor_size);
         vec3 c = is_cube ? cube_decode(face, 2.0 * centre - 1.0) : directional_decode(centre);
         vec3 n = unpack_octahedral(texel.y, PACKED_NORMAL_BITS);
-        distance = impostor_plane(distance, dot(n, c), dot(n, v));
+        return impostor_plane_ratio(impostor_plane(inverse, n, c), l, size);
     }
-    return distance;
+    return inverse * size;
 }
 
 #endif

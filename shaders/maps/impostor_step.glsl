@@ -7,11 +7,19 @@ const float IMPOSTOR_PLANE_BOUND = 2.0;
 // Difference of two ratios below which no line goes through them.
 const float IMPOSTOR_FLAT = 1e-6;
 
-// Of a texel's distance at its centre, along its plane; by the cosines of both directions with its normal.
-float impostor_plane(float distance, float at_centre, float at_direction) {
-    return at_centre * at_direction > 0.0
-               ? distance * clamp(at_centre / at_direction, 1.0 / IMPOSTOR_PLANE_BOUND, IMPOSTOR_PLANE_BOUND)
-               : distance;
+// A texel's plane, of the points y with dot(plane.xyz, y) = 1, and one over the distance at the texel's centre, which is given and lies in the unit direction c; of
+// a normal of any length, to either side. A plane that is seen from aside, along it, is none: 0.
+vec4 impostor_plane(float inverse, vec3 n, vec3 c) {
+    float at_centre = dot(n, c);
+    return vec4(at_centre != 0.0 ? (inverse / at_centre) * n : vec3(0.0), inverse);
+}
+
+// The length `size` of l over the distance of a texel's plane in the direction of l: below 1 in front of it. No more than a bound from that over the distance at the
+// centre, since a plane seen from aside has any distance within a texel; where the plane does not lie that way, just that.
+float impostor_plane_ratio(vec4 plane, vec3 l, float size) {
+    float at_centre = plane.w * size;
+    float along = dot(plane.xyz, l);
+    return along > 0.0 ? clamp(along, (1.0 / IMPOSTOR_PLANE_BOUND) * at_centre, IMPOSTOR_PLANE_BOUND * at_centre) : at_centre;
 }
 
 // From a guess (d, g) by the line through it and another one, or, without, through the point at infinity.

@@ -32,9 +32,15 @@ void main() {
         out3(3u, refracted(in3(0u), in3(3u), in1(6u)));
         break;
     }
-    case 2u: {  // steps and planes
+    case 2u: {  // steps
         out1(0u, impostor_step(in2(0u), in_bits(5u) != 0u, in2(2u), in1(4u)));
-        out1(1u, impostor_plane(in1(6u), in1(7u), in1(8u)));
+        break;
+    }
+    case 5u: {  // planes of texels
+        vec4 plane = impostor_plane(in1(0u), in3(1u), in3(4u));
+        out3(0u, plane.xyz);
+        out1(3u, plane.w);
+        out1(4u, impostor_plane_ratio(plane, in3(7u), in1(10u)));
         break;
     }
     case 3u: {  // places of maps

@@ -6,7 +6,9 @@
 #include "twin_interface.glsl"
 
 // A layer's box has the half width that the table says.
-float impostor_distance(uint layer, vec3 v) { return twin_table[layer] / max(abs(v.x), max(abs(v.y), abs(v.z))); }
+float impostor_look_up(uint layer, vec3 l, float size) {
+    return size > 0.0 ? max(abs(l.x), max(abs(l.y), abs(l.z))) / twin_table[layer] : 0.0;
+}
 
 #include "maps/impostor.glsl"
 

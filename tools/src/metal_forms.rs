@@ -8,7 +8,7 @@ use clerestory::transport::fresnel::form::MetalFresnel;
 use clerestory::transport::fresnel::fresnel_conductor;
 use clerestory::transport::fresnel::rescaled::fresnel_rescaled;
 use clerestory::transport::ggx::{ggx_d, ggx_g2};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// The cosines that errors are taken over: even steps from 0 to 1, both included.
 pub const STEPS: u32 = 20_000;
@@ -102,11 +102,44 @@ const SPHERE_ALPHA: f64 = 0.3;
 /// reflect are met at this angle: above the middle by the exact factor, below it by another form. Radiance is scaled so that a perfect mirror's highlight
 /// is white at its brightest.
 pub fn split_sphere(exact: &MetalFresnel, below: &MetalFresnel, degrees: f64, side: u32) -> Vec<DVec3> {
+    let c = degrees.to_radians().cos();
+    split_part([exact, below].map(|fresnel| fresnel.at(c)), degrees, Part::WHOLE, side)
+}
+
+/// The seam of a split sphere from close by, where the light's edge of the sphere meets the middle. Below the middle the difference between the forms is so many times
+/// what it is.
+pub fn seam(exact: &MetalFresnel, below: &MetalFresnel, degrees: f64, times: f64, side: u32) -> Vec<DVec3> {
+    let c = degrees.to_radians().cos();
+    let [upper, lower] = [exact, below].map(|fresnel| fresnel.at(c));
+    let magnified = (upper + times * (lower - upper)).max(DVec3::ZERO);
+    split_part([upper, magnified], degrees, Part::SEAM, side)
+}
+
+/// A square part of the view of a sphere of radius 1.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    middle: DVec2,
+    half_width: f64,
+}
+
+impl Part {
+    const WHOLE: Self = Self {
+        middle: DVec2::ZERO,
+        half_width: 1.0,
+    };
+    /// All that is lit at the middle of spheres from 70° of incidence on: what lies beyond the cosine of 40°.
+    const SEAM: Self = Self {
+        middle: DVec2::new(0.875, 0.0),
+        half_width: 0.125,
+    };
+}
+
+/// Of a part of the sphere, by the factors above and below the middle.
+fn split_part([upper, lower]: [DVec3; 2], degrees: f64, part: Part, side: u32) -> Vec<DVec3> {
     let (sine, cosine) = degrees.to_radians().sin_cos();
     // The viewer is at z; the light is to its right.
     let light = DVec3::new(2.0 * sine * cosine, 0.0, cosine * cosine - sine * sine);
     let half = DVec3::new(sine, 0.0, cosine);
-    let [upper, lower] = [exact, below].map(|fresnel| fresnel.at(cosine));
     let shape = |n: DVec3| {
         let (cos_i, cos_o) = (n.dot(light), n.z);
         if cos_i <= 0.0 || cos_o <= 0.0 {
@@ -119,10 +152,9 @@ pub fn split_sphere(exact: &MetalFresnel, below: &MetalFresnel, degrees: f64, si
     };
     let size = f64::from(side);
     let at = |i: u32| {
-        let (x, y) = (
-            2.0 * (f64::from(i % side) + 0.5) / size - 1.0,
-            1.0 - 2.0 * (f64::from(i / side) + 0.5) / size,
-        );
+        let across = 2.0 * (f64::from(i % side) + 0.5) / size - 1.0;
+        let up = 1.0 - 2.0 * (f64::from(i / side) + 0.5) / size;
+        let DVec2 { x, y } = part.middle + part.half_width * DVec2::new(across, up);
         let z2 = 1.0 - x * x - y * y;
         if z2 <= 0.0 {
             return (0.0, y);
@@ -176,6 +208,43 @@ mod tests {
         // Gold at 550 nm, whose printed term is infinite at normal incidence.
         let printed = FormError::of(Way::PrintedRule, 0.4241, 2.4721, STEPS);
         assert!(printed.worst.is_infinite() && printed.at == 1.0, "{printed:?}");
+    }
+
+    /// All that is lit of the whole sphere's middle rows, of the same brightness, with the step between the halves as large as it is said to be.
+    #[test]
+    fn a_seam_is_the_spheres_from_close_by() {
+        let (eta, k) = (DVec3::new(1.92, 1.02, 0.59), DVec3::new(8.14, 6.63, 5.27));
+        let [exact, rescaled] = [FresnelForm::Exact, FresnelForm::Rescaled].map(|form| MetalFresnel::new(form, eta, k));
+        let side = 64;
+        for degrees in [80.0, 75.0, 70.0] {
+            let c = f64::to_radians(degrees).cos();
+            let (upper, lower) = (exact.at(c), rescaled.at(c));
+            let pictures = [1.0, 2.0].map(|times| seam(&exact, &rescaled, degrees, times, side));
+            let lit = |picture: &[DVec3]| picture.iter().filter(|texel| texel.x > 0.0).count();
+            assert!(lit(&pictures[0]) > 100, "{degrees}");
+            for (times, picture) in [1.0, 2.0].into_iter().zip(&pictures) {
+                let row = |row: u32| &picture[(row * side) as usize..((row + 1) * side) as usize];
+                // On both sides of the middle, a row each.
+                for (above, below) in row(side / 2 - 1).iter().zip(row(side / 2)) {
+                    let expected = *above * (1.0 + times * (lower - upper) / upper);
+                    assert!(
+                        (*below - expected).abs().max_element() < 1e-9,
+                        "{degrees}, {times}: {above} {below}"
+                    );
+                }
+            }
+            // The brightest place of the whole is among what is seen, and nothing of its middle row is left out.
+            let most = pictures[0].iter().fold(DVec3::ZERO, |most, texel| most.max(*texel));
+            let brightest = upper.max(lower);
+            assert!(
+                (most - brightest).abs().max_element() < 1e-9,
+                "{degrees}: {most} {brightest}"
+            );
+            let whole = split_sphere(&exact, &rescaled, degrees, 1024);
+            let middle = &whole[512 * 1024..513 * 1024];
+            let first = middle.iter().position(|texel| texel.x > 0.0).expect("light");
+            assert!(first as f64 >= 1024.0 * 0.875, "{degrees}: {first}");
+        }
     }
 
     #[test]

@@ -73,7 +73,7 @@ ImpostorHit reflected_hit(vec3 x, vec3 r) {
         float size = length(l);
         return ImpostorHit(size > 0.0 ? l / size : r, d, 0.0, 0u);
     }
-    vec2 extent = IMPOSTOR_METHOD == IMPOSTOR_CLASSICAL ? vec2(0.0) : impostor_shapes[0].extent;
+    vec2 extent = IMPOSTOR_METHOD == IMPOSTOR_CLASSICAL ? vec2(0.0) : impostor_extent;
     return impostor_search(x, r, extent, push.tolerance);
 }
 

@@ -31,21 +31,21 @@ layout(push_constant, scalar) uniform Push {
     float tolerance;
 } push;
 
-float impostor_distance(uint layer, vec3 v);
+float impostor_look_up(uint layer, vec3 l, float size);
 
 #include "maps/impostor.glsl"
 
-// To the one layer of surfaces that there is.
-float impostor_distance(uint layer, vec3 v) {
-    ivec2 size = textureSize(probe_distances, 0);
-    ivec2 p = clamp(ivec2((0.5 * octahedron_encode(v) + 0.5) * vec2(size)), ivec2(0), size - 1);
-    float distance = min(texelFetch(probe_distances, p, 0).x, IMPOSTOR_NOTHING);
-    if (distance < IMPOSTOR_NOTHING) {
-        vec3 c = octahedron_decode((2.0 * vec2(p) + 1.0) / vec2(size) - 1.0);
-        vec3 n = unpack_octahedral(texelFetch(probe_normals, p, 0).x, PACKED_NORMAL_BITS);
-        distance = impostor_plane(distance, dot(n, c), dot(n, v));
+// In the one layer of surfaces that there is.
+float impostor_look_up(uint layer, vec3 l, float size) {
+    ivec2 texels = textureSize(probe_distances, 0);
+    ivec2 p = min(ivec2((0.5 * octahedron_encode(l) + 0.5) * vec2(texels)), texels - 1);
+    float distance = texelFetch(probe_distances, p, 0).x;
+    if (!(distance < IMPOSTOR_NOTHING)) {
+        return IMPOSTOR_NOTHING_INVERSE * size;
     }
-    return distance;
+    vec3 c = octahedron_decode((2.0 * vec2(p) + 1.0) / vec2(texels) - 1.0);
+    vec3 n = unpack_octahedral(texelFetch(probe_normals, p, 0).x, PACKED_NORMAL_BITS);
+    return impostor_plane_ratio(impostor_plane(1.0 / distance, n, c), l, size);
 }
 
 void main() {

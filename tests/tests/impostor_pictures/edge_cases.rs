@@ -42,12 +42,17 @@ fn without_a_reflector_there_is_no_map() {
         let classical = rendered(&shiny, "impostor", SIZE, 8, json!({"method": "classical", "side": 64}));
         let hybrid = rendered(&shiny, "impostor", SIZE, 8, json!({"side": 64}));
         assert!(names(&hybrid).iter().any(|name| name == "impostor: reflect"));
-        // Three numbers a texel, and two more where there are distances.
+        let lean = rendered(&shiny, "impostor", SIZE, 8, json!({"side": 64, "texels": "normals"}));
+        // Three numbers a texel, and four more where there are distances, with planes, or two with normals.
         let bytes = |rendered: &Rendered| rendered.report.counters["map_bytes"];
         assert_eq!(
-            [bytes(&classical), bytes(&hybrid)],
-            [12, 20].map(|texel| 64 * 64 * texel)
+            [bytes(&classical), bytes(&hybrid), bytes(&lean)],
+            [12, 28, 20].map(|texel| 64 * 64 * texel)
         );
+        // Planes and normals show the same, but where rounding chooses the texel.
+        let pairs = layer(&hybrid, "radiance").iter().zip(layer(&lean, "radiance"));
+        let differs = pairs.filter(|&(a, b)| (a - b).abs() > 1e-3 * (1.0 + b.abs())).count();
+        assert!(differs < (3 * SIZE * SIZE / 20) as usize, "{differs} numbers differ");
     });
 }
 

@@ -179,7 +179,7 @@ fn layers_show_what_a_pillar_hides() {
                     sphere.name
                 );
                 assert!((share - published).abs() < 1.5, "{} {layers}: {share}", sphere.name);
-                assert_eq!(technique.counters()["map_bytes"], 512 * 512 * 20 * u64::from(layers));
+                assert_eq!(technique.counters()["map_bytes"], 512 * 512 * 28 * u64::from(layers));
             }
             // Pictures follow.
             const SIZE: u32 = 24;

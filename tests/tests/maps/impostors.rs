@@ -1,19 +1,17 @@
 //! Distance impostors on the device: the published errors in rooms whose rays are known exactly, edges, and bits over runs.
 
-use clerestory::Error;
 use clerestory::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery};
-use clerestory::gpu::{BufferDesc, Category, Gpu, GpuOptions, Lesser};
-use clerestory::maps::impostor::layouts::{ImpostorLayout, ImpostorLayouts};
+use clerestory::gpu::{BufferDesc, Category, Gpu};
+use clerestory::maps::Parametrization;
 use clerestory::maps::impostor::published;
 use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
 use clerestory::maps::impostor::{
-    Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, SearchMethod,
+    Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, ImpostorSurface, SearchMethod,
 };
-use clerestory::maps::{MapImage, Parametrization, Texel};
-use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
+use clerestory_tests::with_gpu;
 use glam::{DVec3, UVec2};
 
-const MAPS: [Parametrization; 2] = [Parametrization::Cube, Parametrization::OctahedronQuadratic];
+pub const MAPS: [Parametrization; 2] = [Parametrization::Cube, Parametrization::OctahedronQuadratic];
 /// Texels of a cube of 256² a face, which octahedra have as many of.
 const TEXELS: f64 = 6.0 * 256.0 * 256.0;
 /// Pixels along a side of a view of the sphere.
@@ -46,7 +44,7 @@ fn near(what: &str, found: f64, published: f64) {
 
 /// Off from the twin by more than a hundredth of a degree or a thousandth of residual, or in another layer: rays at texels' borders and silhouettes, where
 /// rounding chooses the texel.
-fn share_that_differs(
+pub fn share_that_differs(
     image: &ImpostorImage,
     rays: &[ImpostorRay],
     hits: &[ImpostorHit],
@@ -308,7 +306,7 @@ fn rays_that_are_none_find_nothing_in_the_kernel() {
 fn the_sky_is_seen_in_the_rays_own_direction() {
     with_gpu(|gpu| {
         let floor = |d: DVec3| {
-            let below = (d.y < -1e-3).then(|| clerestory::maps::impostor::ImpostorSurface {
+            let below = (d.y < -1e-3).then(|| ImpostorSurface {
                 distance: -1.0 / d.y,
                 normal: DVec3::Y,
             });
@@ -333,69 +331,6 @@ fn the_sky_is_seen_in_the_rays_own_direction() {
                 hits[1]
             );
         }
-    });
-}
-
-/// Four bytes a texel and layer, as many again for normals that were asked for, and none for those that were not.
-#[test]
-fn distances_have_a_buffer_of_their_own() {
-    with_gpu(|gpu| {
-        let bytes = |layers: u32, with_normals: bool| {
-            let image = ImpostorImage::from_fn(Parametrization::Cube, UVec2::splat(16), layers, with_normals, |d| {
-                BoxRoom::BOX.surfaces(d)
-            });
-            Impostor::new(gpu, &image.unwrap()).unwrap().bytes()
-        };
-        assert_eq!(bytes(1, false), 6 * 16 * 16 * 4);
-        assert_eq!(bytes(3, true), 2 * 3 * 6 * 16 * 16 * 4);
-    });
-}
-
-/// Distances beside the radiance of texels, or in a buffer of their own: the same bits, and the radiance in the direction that the twin finds.
-#[test]
-fn layouts_show_the_same_radiance() {
-    with_gpu(|gpu| {
-        let (map, size) = (Parametrization::Cube, UVec2::splat(32));
-        let sphere = ShinySphere::C;
-        let image = ImpostorImage::from_fn(map, size, 1, false, |d| sphere.room.surfaces(d)).unwrap();
-        let number = |texel: Texel| f64::from((texel.layer * size.y + texel.y) * size.x + texel.x);
-        let radiance = MapImage::from_fn(map, size, |texel| DVec3::new(number(texel), 1.0, 0.5)).unwrap();
-        let layouts = ImpostorLayouts::new(gpu, &radiance, &image).unwrap();
-        let rays = sphere.rays(40, None);
-        for (method, steps) in [(SearchMethod::Classical, 0), (SearchMethod::FalsePosition, 3)] {
-            let settings = ImpostorSettings::of(method, steps);
-            let [split, packed] = [ImpostorLayout::Split, ImpostorLayout::Packed].map(|layout| {
-                layouts
-                    .look_up(&settings, layout)
-                    .unwrap()
-                    .look_up_timed(&rays)
-                    .unwrap()
-                    .0
-            });
-            assert_eq!(split, packed, "{method}");
-            let differs = rays.iter().zip(&split).filter(|(ray, found)| {
-                let at = map.encode(image.search(ray, &settings).direction).unwrap();
-                let p = (at.uv * size.as_dvec2()).as_uvec2().min(size - 1);
-                let texel = Texel {
-                    layer: at.layer,
-                    x: p.x,
-                    y: p.y,
-                };
-                **found != radiance.at(texel).as_dvec3()
-            });
-            let share = differs.count() as f64 / rays.len() as f64;
-            assert!(share < 0.02, "{method}: {share}");
-        }
-        let other = MapImage::from_fn(map, UVec2::splat(16), |_| DVec3::ONE).unwrap();
-        assert!(
-            ImpostorLayouts::new(gpu, &other, &image)
-                .unwrap_err()
-                .to_string()
-                .contains("radiance")
-        );
-        let layered = ImpostorImage::from_fn(map, size, 2, false, |d| sphere.room.surfaces(d)).unwrap();
-        let error = ImpostorLayouts::new(gpu, &radiance, &layered).unwrap_err().to_string();
-        assert!(error.contains("several layers"), "{error}");
     });
 }
 
@@ -464,41 +399,4 @@ fn what_cannot_be_searched_is_refused_by_name() {
         let (found, _) = of_open.search_timed(&impostor, &[good]).unwrap();
         assert_eq!(found, impostor.search(&[good], &settings).unwrap());
     });
-}
-
-/// Three layers of squares, a texel more than a buffer may have.
-#[test]
-fn distances_beyond_a_texel_buffer_are_refused() {
-    const LAYERS: u32 = 3;
-    const SIDE: u32 = 16;
-    let count = u64::from(LAYERS * SIDE * SIDE);
-    let gpu = gpu_with(&GpuOptions {
-        lesser: Lesser {
-            max_texel_buffer_elements: Some(count - 1),
-            ..Lesser::default()
-        },
-        ..GpuOptions::default()
-    });
-    let map = Parametrization::OctahedronQuadratic;
-    let of = |layers| {
-        let count = (layers * SIDE * SIDE) as usize;
-        ImpostorImage::new(map, UVec2::splat(SIDE), layers, vec![1.0; count], None).unwrap()
-    };
-    assert!(Impostor::new(&gpu, &of(LAYERS - 1)).is_ok());
-    let error = Impostor::new(&gpu, &of(LAYERS)).unwrap_err();
-    let Error::LimitExceeded {
-        name,
-        value,
-        limit_name,
-        limit,
-    } = &error
-    else {
-        panic!("{error}");
-    };
-    assert_eq!(
-        (name.as_str(), *limit_name),
-        ("impostor: texels", "maxTexelBufferElements")
-    );
-    assert_eq!((*value, *limit), (count, count - 1));
-    assert_no_messages(&gpu);
 }

@@ -2,4 +2,5 @@
 
 mod directional_maps;
 mod gathers;
+mod impostor_texels;
 mod impostors;

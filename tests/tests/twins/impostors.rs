@@ -3,9 +3,9 @@
 use clerestory::maps::gather::{Reflectivity, SolidAngleForm, gather_solid_angle};
 use clerestory::maps::impostor::places::blended_maps;
 use clerestory::maps::impostor::proxy::{box_proxy, hemisphere_proxy, mirrored, refracted, sphere_proxy};
-use clerestory::maps::impostor::{impostor_plane, impostor_step};
+use clerestory::maps::impostor::{impostor_plane, impostor_plane_ratio, impostor_step};
 use clerestory_tests::random::Random;
-use clerestory_tests::twin::{Tolerance, U, compare};
+use clerestory_tests::twin::{Case, Tolerance, U, compare};
 use clerestory_tests::{twin_kernel, with_gpu};
 use glam::{DVec3, Vec3};
 
@@ -106,32 +106,67 @@ fn directions_agree_with_their_twins() {
 }
 
 #[test]
-fn steps_and_planes_agree_with_their_twins() {
+fn steps_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(72, |r: &mut Random| {
-            // Ratios apart, equal to the bit, or of a plane seen from aside.
+            // Ratios apart, or equal to the bit.
             let g = r.range(0.2, 1.8);
             let other = if r.below(4) == 0 {
                 g
             } else {
                 g + r.choose(&[0.3, -0.2, 0.05])
             };
-            let cosines = [r.signed(), r.signed() * r.choose(&[1.0, 1e-3])];
             join(&[
                 &[r.range(0.0, 3.0), g, r.range(0.0, 3.0), other, r.range(0.5, 4.0)],
-                &[f32::from_bits(r.below(2) as u32), r.range(0.1, 10.0)],
-                &cosines,
+                &[f32::from_bits(r.below(2) as u32)],
             ])
         });
         let results = twin_impostor(gpu, 2, &table, &[]);
         let worst = compare("steps", &table, &results, of_size_one(8.0, 0.0), 0..5, |x| {
             let other = ((x[5] as f32).to_bits() != 0).then_some((x[2], x[3]));
-            vec![
-                impostor_step((x[0], x[1]), other, x[4]),
-                impostor_plane(x[6], x[7], x[8]),
-            ]
+            vec![impostor_step((x[0], x[1]), other, x[4])]
         });
         println!("steps: {worst:.3} of what is allowed");
+    });
+}
+
+/// Planes across directions and nearly along them, in front and behind, near and far; and those that are none.
+#[test]
+fn planes_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let aside = [Vec3::X, Vec3::Y, Vec3::NEG_Z];
+        let table = cases(78, |r: &mut Random| {
+            let c = direction(r);
+            let n = r.choose(&[1.0, -1.0, 0.3]) * direction(r);
+            let (n, c) = if r.below(10) == 0 {
+                let i = r.below(3);
+                (aside[i], aside[(i + 1) % 3])
+            } else {
+                (n, c)
+            };
+            let size = r.range(0.1, 10.0);
+            let l = size * (c + r.choose(&[0.0, 0.01, 0.5]) * r.vector());
+            // Lengths of a room, and of where there is no surface.
+            let near = r.range(0.1, 10.0);
+            let inverse = r.choose(&[near, 1e-16, 1e16]);
+            join(&[&[inverse], &n.to_array(), &c.to_array(), &l.to_array(), &[l.length()]])
+        });
+        let results = twin_impostor(gpu, 5, &table, &[]);
+        // A plane along a direction goes anywhere.
+        let is_across = |case: &Case| {
+            let x = case.0.map(f64::from);
+            let at_centre = v3(&x, 1).dot(v3(&x, 4)).abs();
+            at_centre == 0.0 || at_centre > 1e-2
+        };
+        let kept: Vec<_> = table.iter().zip(&results).filter(|(case, _)| is_across(case)).collect();
+        assert!(kept.len() > table.len() * 8 / 10, "{}", kept.len());
+        let (table, results): (Vec<_>, Vec<_>) = kept.into_iter().map(|(case, result)| (*case, *result)).unzip();
+        let worst = compare("planes", &table, &results, of_size_one(8.0, 0.0), 1..11, |x| {
+            let plane = impostor_plane(x[0], v3(x, 1), v3(x, 4));
+            let ratio = impostor_plane_ratio(plane, v3(x, 7), x[10]);
+            list![plane.to_array(), [ratio]]
+        });
+        println!("planes: {worst:.3} of what is allowed");
     });
 }
 

@@ -5,9 +5,10 @@ use glam::DVec3;
 use super::super::Parametrization;
 use super::super::directional_map::kind;
 use super::search::is_ray;
-use super::settings::ImpostorSettings;
+use super::settings::{ImpostorSettings, ImpostorTexels};
 use super::{ImpostorHit, ImpostorImage, ImpostorRay};
 use crate::gpu::ash::vk;
+use crate::gpu::shaders::constants::{IMPOSTOR_HOLDS_DISTANCE, IMPOSTOR_HOLDS_NORMAL, IMPOSTOR_HOLDS_PLANE};
 use crate::gpu::shaders::maps::impostor_search as kernel;
 use crate::gpu::shaders::sets::ImpostorSet;
 use crate::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery, ImpostorShape};
@@ -15,26 +16,34 @@ use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu,
 use crate::maps::is_unit;
 use crate::{Error, Result};
 
-/// Distances and normals of an [`ImpostorImage`] in the device's memory: four bytes a texel and layer, and as many again for normals.
+/// An [`ImpostorImage`] in the device's memory: four bytes a texel and layer for distances alone, with normals sixteen or eight ([`ImpostorTexels`]).
 #[derive(Debug)]
 pub struct Impostor {
     gpu: Gpu,
     map: Parametrization,
     kind: u32,
     layers: u32,
-    has_normals: bool,
+    holds: u32,
     is_open: bool,
     shape: Buffer,
     texels: TexelView,
 }
 
 impl Impostor {
-    /// Uploads an image.
+    /// Uploads an image, with normals as planes.
+    ///
+    /// # Errors
+    /// As [`Impostor::with_texels`].
+    pub fn new(gpu: &Gpu, image: &ImpostorImage) -> Result<Self> {
+        Self::with_texels(gpu, image, ImpostorTexels::default())
+    }
+
+    /// Uploads an image, whose texels hold what is said where it has normals.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] for one of more texels than a texel buffer has; [`Error::Setting`] for a map that no kernel looks up;
     /// [`Error::OutOfMemory`], [`Error::DeviceLost`].
-    pub fn new(gpu: &Gpu, image: &ImpostorImage) -> Result<Self> {
+    pub fn with_texels(gpu: &Gpu, image: &ImpostorImage, texels: ImpostorTexels) -> Result<Self> {
         let kind =
             kind(image.map()).ok_or_else(|| Error::setting("map", image.map(), "has no impostors on the device"))?;
         let shape = ImpostorShape {
@@ -42,20 +51,32 @@ impl Impostor {
             extent: image.extent(),
         };
         let name = "impostor: texels";
-        let texels = match image.normals() {
-            Some(normals) => {
-                let pairs = image.distances().iter().zip(normals);
-                let pairs: Vec<[u32; 2]> = pairs.map(|(distance, normal)| [distance.to_bits(), *normal]).collect();
-                gpu.texels_with(name, Category::Light, vk::Format::R32G32_UINT, &pairs)
+        let planes = match texels {
+            ImpostorTexels::Planes => image.planes(),
+            ImpostorTexels::Normals => None,
+        };
+        let (holds, texels) = match (planes, image.normals()) {
+            (Some(planes), _) => {
+                let texels = gpu.texels_with(name, Category::Light, vk::Format::R32G32B32A32_UINT, &planes);
+                (IMPOSTOR_HOLDS_PLANE, texels)
             }
-            None => gpu.texels_with(name, Category::Light, vk::Format::R32_UINT, image.distances()),
+            (None, Some(normals)) => {
+                let pairs = image.inverses().into_iter().zip(normals);
+                let pairs: Vec<[u32; 2]> = pairs.map(|(inverse, normal)| [inverse.to_bits(), *normal]).collect();
+                let texels = gpu.texels_with(name, Category::Light, vk::Format::R32G32_UINT, &pairs);
+                (IMPOSTOR_HOLDS_NORMAL, texels)
+            }
+            (None, None) => {
+                let texels = gpu.texels_with(name, Category::Light, vk::Format::R32_UINT, &image.inverses());
+                (IMPOSTOR_HOLDS_DISTANCE, texels)
+            }
         };
         Ok(Self {
             gpu: gpu.clone(),
             map: image.map(),
             kind,
             layers: image.layers(),
-            has_normals: image.normals().is_some(),
+            holds,
             is_open: image.is_open(),
             shape: gpu.buffer_with("impostor: shape", Category::Light, &[shape])?,
             texels: texels?,
@@ -72,7 +93,12 @@ impl Impostor {
         self.layers
     }
 
-    /// Bytes of distances, and of normals where there are any.
+    /// What a texel holds, the kernels' specialization constant `IMPOSTOR_HOLDS`.
+    pub fn holds(&self) -> u32 {
+        self.holds
+    }
+
+    /// Bytes of all texels.
     pub fn bytes(&self) -> u64 {
         self.texels.buffer().bytes()
     }
@@ -120,7 +146,7 @@ pub(super) fn queries(rays: &[ImpostorRay]) -> Result<Vec<ImpostorQuery>> {
     rays.iter().enumerate().map(query).collect()
 }
 
-/// A search on the device: a kernel over rays, specialized by the method, its steps, the map, its layers, and whether it has normals and places without a surface.
+/// A search on the device: a kernel over rays, specialized by the method, its steps, the map, its layers, what its texels hold, and whether it has places without a surface.
 #[derive(Debug)]
 pub struct ImpostorSearch {
     spec: kernel::Spec,
@@ -151,7 +177,7 @@ impl ImpostorSearch {
             impostor_steps: settings.steps,
             impostor_bisections: settings.bisections,
             impostor_layers: impostor.layers,
-            impostor_planes: impostor.has_normals,
+            impostor_holds: impostor.holds,
             impostor_is_open: impostor.is_open,
         }
     }
@@ -196,8 +222,8 @@ impl ImpostorSearch {
     /// ended. After it the hits have been written by a compute shader.
     ///
     /// # Errors
-    /// [`Error::Setting`] for an impostor of another map, other layers, with normals where the one before had none or the other way round, or with places without
-    /// a surface where that one had none; and as [`Pass::dispatch`].
+    /// [`Error::Setting`] for an impostor of another map, other layers, whose texels hold something else, or with places without a surface where the one before had
+    /// none; and as [`Pass::dispatch`].
     pub fn record(
         &self,
         pass: &mut Pass<'_>,
@@ -208,13 +234,13 @@ impl ImpostorSearch {
     ) -> Result<()> {
         let same = impostor.kind == self.spec.directional_kind
             && impostor.layers == self.spec.impostor_layers
-            && impostor.has_normals == self.spec.impostor_planes
+            && impostor.holds == self.spec.impostor_holds
             && (self.spec.impostor_is_open || !impostor.is_open);
         if !same {
             return Err(Error::setting(
                 "impostor",
                 impostor.map,
-                "differs in map, layers, normals or places without a surface",
+                "differs in map, layers, what texels hold or places without a surface",
             ));
         }
         let set = kernel::Set0 { queries: rays, hits };

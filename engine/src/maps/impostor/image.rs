@@ -1,10 +1,12 @@
 //! Distances and normals in the texels of a map, on the host: the twin of what [`Impostor`](super::Impostor) holds on the device.
 
-use glam::{DVec3, UVec2};
+use glam::{DVec3, DVec4, UVec2};
 
 use super::super::packed_direction::{pack_octahedral_nearest, unpack_octahedral};
 use super::super::{Parametrization, Texel};
-use crate::gpu::shaders::constants::{IMPOSTOR_LAYERS_MAX, IMPOSTOR_NOTHING, IMPOSTOR_PLANE_BOUND, PACKED_NORMAL_BITS};
+use crate::gpu::shaders::constants::{
+    IMPOSTOR_LAYERS_MAX, IMPOSTOR_NOTHING, IMPOSTOR_NOTHING_INVERSE, IMPOSTOR_PLANE_BOUND, PACKED_NORMAL_BITS,
+};
 use crate::{Error, Result};
 
 /// A surface that is seen in a direction from the map's place.
@@ -55,14 +57,28 @@ pub(super) fn check(map: Parametrization, size: UVec2, layers: u32) -> Result<()
     Ok(())
 }
 
-/// The distance of a plane in a direction, by that in another one and the cosines of both with its normal; no more than a bound apart, since a
-/// plane seen from aside has any distance within a texel. Where the plane does not lie that way: the distance as it was.
-pub fn impostor_plane(distance: f64, at_centre: f64, at_direction: f64) -> f64 {
-    if at_centre * at_direction > 0.0 {
-        let bound = f64::from(IMPOSTOR_PLANE_BOUND);
-        distance * (at_centre / at_direction).clamp(1.0 / bound, bound)
+/// A texel's plane, of the points y with m·y = 1, where m is the first three numbers; the fourth is one over the distance at the texel's centre, which is given and
+/// lies in the unit direction `c`. Of a normal of any length, to either side; a plane that is seen from aside, along it, is none: m is 0.
+pub fn impostor_plane(inverse: f64, n: DVec3, c: DVec3) -> DVec4 {
+    let at_centre = n.dot(c);
+    let m = if at_centre == 0.0 {
+        DVec3::ZERO
     } else {
-        distance
+        (inverse / at_centre) * n
+    };
+    m.extend(inverse)
+}
+
+/// The length `size` of l over the distance of a texel's plane in the direction of l: below 1 in front of it. No more than a bound from that over the distance at
+/// the texel's centre, since a plane seen from aside has any distance within a texel; where the plane does not lie that way, just that.
+pub fn impostor_plane_ratio(plane: DVec4, l: DVec3, size: f64) -> f64 {
+    let at_centre = plane.w * size;
+    let along = plane.truncate().dot(l);
+    if along > 0.0 {
+        let bound = f64::from(IMPOSTOR_PLANE_BOUND);
+        along.clamp(at_centre / bound, at_centre * bound)
+    } else {
+        at_centre
     }
 }
 
@@ -205,7 +221,38 @@ impl ImpostorImage {
         self.distances.iter().any(|distance| *distance >= farthest)
     }
 
-    /// Distance to the surface of a layer in a direction of any length but 0: twin of `impostor_distance` of `maps/impostor_set.glsl`.
+    /// One over the distance of a texel, by its number.
+    fn inverse(&self, i: usize) -> f64 {
+        let distance = self.distances[i];
+        if distance < Self::NOTHING {
+            1.0 / f64::from(distance)
+        } else {
+            f64::from(IMPOSTOR_NOTHING_INVERSE)
+        }
+    }
+
+    /// Texels as kernels read them without normals: one over the distance.
+    pub(super) fn inverses(&self) -> Vec<f32> {
+        (0..self.distances.len()).map(|i| self.inverse(i) as f32).collect()
+    }
+
+    /// Texels as kernels read them by planes: [`impostor_plane`], without one where there is no surface. `None` without normals.
+    pub(super) fn planes(&self) -> Option<Vec<[f32; 4]>> {
+        let normals = self.normals.as_ref()?;
+        let layers = (0..self.layers).flat_map(|_| self.map.texels(self.size));
+        let plane = |(i, texel): (usize, Texel)| {
+            let inverse = self.inverse(i);
+            let centre = self.map.texel_direction(self.size, texel);
+            let plane = match centre.filter(|_| self.distances[i] < Self::NOTHING) {
+                Some(centre) => impostor_plane(inverse, unpack_octahedral(normals[i], PACKED_NORMAL_BITS), centre),
+                None => DVec3::ZERO.extend(inverse),
+            };
+            plane.as_vec4().to_array()
+        };
+        Some(layers.enumerate().map(plane).collect())
+    }
+
+    /// Distance to the surface of a layer in a direction of any length but 0; a length over it is what `impostor_look_up` of `maps/impostor_set.glsl` gives.
     pub fn distance(&self, layer: u32, direction: DVec3) -> f64 {
         let nothing = f64::from(Self::NOTHING);
         let Some((at, v)) = self.map.encode(direction).zip(direction.try_normalize()) else {
@@ -230,7 +277,7 @@ impl ImpostorImage {
         let plane = self.normals.as_ref().zip(self.map.texel_direction(self.size, texel));
         plane.map_or(f64::from(distance), |(normals, centre)| {
             let n = unpack_octahedral(normals[i], PACKED_NORMAL_BITS);
-            impostor_plane(distance.into(), n.dot(centre), n.dot(v))
+            1.0 / impostor_plane_ratio(impostor_plane(self.inverse(i), n, centre), v, 1.0)
         })
     }
 }

@@ -32,7 +32,7 @@ pub struct ImpostorLayouts {
     size: UVec2,
     extent: [f32; 2],
     texels: TexelView,
-    distances: TexelView,
+    inverses: TexelView,
     is_open: bool,
 }
 
@@ -53,9 +53,10 @@ impl ImpostorLayouts {
             return Err(Error::setting("impostor", map, cause));
         }
         let kind = kind(map).ok_or_else(|| Error::setting("map", map, "has no impostors on the device"))?;
-        let both = radiance.texels().iter().zip(image.distances());
+        let inverses = image.inverses();
+        let both = radiance.texels().iter().zip(&inverses);
         let texels: Vec<[f32; 4]> = both
-            .map(|(radiance, distance)| radiance.extend(*distance).to_array())
+            .map(|(radiance, inverse)| radiance.extend(*inverse).to_array())
             .collect();
         let upload = |name, format, values: &[f32]| gpu.texels_with(name, Category::Light, format, values);
         Ok(Self {
@@ -68,7 +69,7 @@ impl ImpostorLayouts {
                 vk::Format::R32G32B32A32_SFLOAT,
                 bytemuck::cast_slice(&texels),
             )?,
-            distances: upload("impostor: distances", vk::Format::R32_SFLOAT, image.distances())?,
+            inverses: upload("impostor: distances", vk::Format::R32_SFLOAT, &inverses)?,
             is_open: image.is_open(),
         })
     }
@@ -123,7 +124,7 @@ impl ImpostorLookUp<'_> {
         let set = kernel::Set0 {
             queries: queries.view(),
             texels: &layouts.texels,
-            distances: &layouts.distances,
+            inverses: &layouts.inverses,
             values: values.view(),
         };
         let push = kernel::Push {

@@ -79,6 +79,17 @@ impl fmt::Display for SearchMethod {
     }
 }
 
+/// What a texel of a map with normals holds on the device. Searches find the same in both, but for rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ImpostorTexels {
+    /// The texel's plane, sixteen bytes, which look-ups take as it is.
+    #[default]
+    Planes,
+    /// Distance and normal, eight bytes, of which each look-up makes the plane.
+    Normals,
+}
+
 /// Settings of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpostorSettings {

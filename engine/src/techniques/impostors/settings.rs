@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::capture::CaptureBy;
-use crate::maps::impostor::{ImpostorSettings, MAX_BISECTIONS, MAX_STEPS, SearchMethod};
+use crate::maps::impostor::{ImpostorSettings, ImpostorTexels, MAX_BISECTIONS, MAX_STEPS, SearchMethod};
 use crate::transport::PathSet;
 use crate::transport::random::SamplerKind;
 use crate::{Error, Result};
@@ -99,6 +99,10 @@ crate::settings! {
         ///
         /// More than one take a method that searches distances, best a march, and a capture by rays.
         pub layers: u32 = 1, in 1..=LAYERS_MAX, unit "layers";
+        /// What a texel holds beside radiance: its plane, in sixteen bytes, or distance and normal in eight, of which each look-up makes the plane.
+        ///
+        /// Pictures are the same but for rounding; a look-up of a plane does less than half.
+        pub texels: ImpostorTexels = ImpostorTexels::Planes;
         /// Along a side of the map's octahedron: how sharp reflections are, and how near searches end.
         pub side: u32 = 256, in 16..=2048, unit "texels";
         /// Scatterings of the light in the map, at most; more than one take a capture by rays.

@@ -10,7 +10,7 @@ use crate::Result;
 use crate::accel::Ray;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
-    DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL, REFLECTION_NONE, REFLECTION_REFRACTED,
+    DIRECTIONAL_OCTAHEDRON, IMPOSTOR_CLASSICAL, IMPOSTOR_HOLDS_DISTANCE, REFLECTION_NONE, REFLECTION_REFRACTED,
 };
 use crate::gpu::shaders::sets::{ImpostorSet, WaveSet};
 use crate::gpu::shaders::techniques::impostors::impostor_reflect as kernel;
@@ -83,7 +83,7 @@ impl Reflections {
         let impostor = captured
             .impostor
             .as_ref()
-            .map(|image| Impostor::new(gpu, image))
+            .map(|image| Impostor::with_texels(gpu, image, settings.texels))
             .transpose()?;
         // Refracted rays are traced on.
         let keeps_look_ups = settings.keeps_look_ups || refracts;
@@ -97,7 +97,7 @@ impl Reflections {
             impostor_steps: search.map_or(0, |search| search.steps),
             impostor_bisections: search.map_or(0, |search| search.bisections),
             impostor_layers: settings.layers,
-            impostor_planes: impostor.is_some(),
+            impostor_holds: impostor.as_ref().map_or(IMPOSTOR_HOLDS_DISTANCE, Impostor::holds),
             impostor_is_open: impostor.as_ref().is_none_or(Impostor::is_open),
             reflects_in_box: settings.method == ReflectionMethod::Box,
             keeps_look_ups,

@@ -18,6 +18,7 @@ mod media_extents;
 mod media_grids;
 mod media_narrow_phase;
 mod million_samples;
+mod mirrors;
 mod nested_dielectrics;
 mod no_light;
 mod non_finite_attributes;
@@ -42,6 +43,7 @@ pub(crate) const ALL: &[HardCase] = &[
     extreme_refraction::CASE,
     grazing_incidence::CASE,
     black_and_white::CASE,
+    mirrors::CASE,
     light_inside_geometry::CASE,
     lights_without_power::CASE,
     many_lights::CASE,

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, UVec2};
 
-use super::super::{ImpostorSurface, MAX_STEPS};
+use super::super::{ImpostorSurface, MAX_STEPS, impostor_plane, impostor_plane_ratio};
 use super::*;
 
 const CUBE: Parametrization = Parametrization::Cube;
@@ -277,9 +277,66 @@ fn planes_hold_over_a_texel_and_no_farther() {
         let off = image.distance(0, d) * d.x.abs() - 2.0;
         assert!(off.abs() < 1e-4, "{off}");
     }
-    let bound = super::super::impostor_plane(1.0, 1.0, 1e-6);
-    assert_eq!((bound, super::super::impostor_plane(1.0, 1e-6, 1.0)), (2.0, 0.5));
-    assert_eq!(super::super::impostor_plane(1.0, 1.0, -0.1), 1.0);
+    let distance = |n: [f64; 3], l: [f64; 3]| {
+        let plane = impostor_plane(1.0, n.into(), DVec3::X);
+        1.0 / impostor_plane_ratio(plane, l.into(), 1.0)
+    };
+    // In directions along the plane, and of one that is seen from aside at the texel's centre.
+    assert_eq!(distance([1.0, 0.0, 0.0], [1e-6, 1.0, 0.0]), 2.0);
+    assert_eq!(distance([1e-6, 1.0, 0.0], [0.0, 1.0, 0.0]), 0.5);
+    // Where there is no plane that way, or none at all.
+    assert_eq!(distance([1.0, 0.0, 0.0], [-0.1, 1.0, 0.0]), 1.0);
+    assert_eq!(distance([0.0, 1.0, 0.0], [0.6, 0.8, 0.0]), 1.0);
+    // A normal's length and side are nothing to it.
+    for by in [-3.0, 0.5] {
+        let (long, unit) = ([0.8 * by, 0.6 * by, 0.0], [0.8, 0.6, 0.0]);
+        let off = distance(long, [0.8, 0.6, 0.0]) - distance(unit, [0.8, 0.6, 0.0]);
+        assert!(off.abs() < 1e-15, "{off}");
+    }
+}
+
+/// What a device has in f32 is what the host has: by planes and by distances alone, where there is a surface and where there is none.
+#[test]
+fn texels_on_the_device_are_those_of_the_host() {
+    let size = UVec2::splat(16);
+    let plates = |d: DVec3| {
+        let below = ImpostorSurface {
+            distance: 3.0 / d.y.abs().max(1e-9),
+            normal: DVec3::Y,
+        };
+        if d.y > 0.3 { Vec::new() } else { vec![below] }
+    };
+    let image = ImpostorImage::from_fn(CUBE, size, 2, true, plates).expect("an impostor");
+    let (inverses, planes) = (image.inverses(), image.planes().expect("normals"));
+    assert_eq!((inverses.len(), planes.len()), (2 * 6 * 16 * 16, 2 * 6 * 16 * 16));
+    let mut nothing = 0;
+    for (i, texel) in CUBE.texels(size).enumerate() {
+        let centre = CUBE.texel_direction(size, texel).expect("a direction");
+        // Beside the centre, within the texel.
+        let l = 2.0 * (centre + DVec3::new(0.01, -0.005, 0.007));
+        for layer in [0, 1] {
+            let at = i + layer as usize * 6 * 16 * 16;
+            let plane = glam::Vec4::from_array(planes[at]).as_dvec4();
+            assert_eq!(plane.w as f32, inverses[at]);
+            let is_nothing = image.distances()[at] >= ImpostorImage::NOTHING;
+            nothing += u32::from(is_nothing);
+            if is_nothing {
+                let none = crate::gpu::shaders::constants::IMPOSTOR_NOTHING_INVERSE;
+                assert_eq!(planes[at], [0.0, 0.0, 0.0, none]);
+                assert!((f64::from(none) * f64::from(ImpostorImage::NOTHING) - 1.0).abs() < 1e-7);
+                continue;
+            }
+            let expected = l.length() / image.distance(layer, l);
+            let found = impostor_plane_ratio(plane, l, l.length());
+            assert!(
+                (found - expected).abs() < 1e-5 * expected,
+                "{texel:?}: {found} {expected}"
+            );
+        }
+    }
+    assert!((6 * 16 * 16..2 * 6 * 16 * 16).contains(&nothing), "{nothing}");
+    let bare = ImpostorImage::from_fn(CUBE, size, 1, false, plates).expect("an impostor");
+    assert!(bare.planes().is_none() && bare.inverses() == inverses[..6 * 16 * 16]);
 }
 
 /// Errors name what is wrong.

@@ -18,7 +18,7 @@ use clerestory::maps::{MapImage, Parametrization};
 use glam::DVec3;
 
 use super::mirrored_rooms;
-use super::search_times::{self, Beside, Steps};
+use super::search_times::{self, Beside, Steps, Texels};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::Errors;
@@ -30,6 +30,9 @@ const PICTURED: u32 = 96;
 /// Texels of a cube of 256² a face.
 const TEXELS: f64 = 6.0 * 256.0 * 256.0;
 const TURNS: usize = 5;
+/// Of look-ups with their radiance, whose times are compared: pixels along a side of the view, and turns.
+const TIMED_SIDE: u32 = 660;
+const TIMED_TURNS: usize = 9;
 /// Index of glass.
 const GLASS: f64 = 1.5;
 
@@ -84,6 +87,8 @@ pub struct Found {
     seen: Vec<Seen>,
     times: Vec<Time>,
     steps: Vec<Steps>,
+    #[serde(default)]
+    texels: Vec<Texels>,
     beside: Vec<Beside>,
 }
 
@@ -275,7 +280,7 @@ fn timed(
             look_ups.push(layouts.look_up(way, layout)?);
         }
     }
-    let times = context.in_turns(TURNS, look_ups.len(), |i| {
+    let times = context.in_turns(TIMED_TURNS, look_ups.len(), |i| {
         let (_, seconds) = look_ups[i].look_up_timed(&rays)?;
         Ok(1e9 * seconds / rays.len().max(1) as f64)
     })?;
@@ -416,6 +421,7 @@ impl Study for Found {
                 &ShinySphere::BOX,
                 [1.0, 630.0 / 430.0, 630.0 / 323.0, 630.0 / 108.0].map(Some),
             );
+            let side = context.pick(TIMED_SIDE, side);
             let mut all = timed(context, &gpu, map, room, side, texels)?;
             all.extend(timed(context, &gpu, map, beside, side, texels)?);
             Ok(all)
@@ -427,6 +433,9 @@ impl Study for Found {
             times: context.each(timed_maps, Parametrization::to_string, |map| times(*map))?,
             steps: context.each(timed_maps, Parametrization::to_string, |map| {
                 search_times::by_steps(context, &gpu, *map, texels)
+            })?,
+            texels: context.each(timed_maps, Parametrization::to_string, |map| {
+                search_times::by_texels(context, &gpu, *map, texels)
             })?,
             beside: search_times::beside_rays(context, &gpu, timed_maps, texels)?,
         })
@@ -456,11 +465,16 @@ impl Study for Found {
             .note(
                 "False position half-way to a wall, with planes and without radiance. A driver may unroll loops of few turns, so that what the first steps add is not what later ones do.",
             )
+            .and(Findings::of(&self.texels, search_times::OF_TEXELS))
+            .note(
+                "The hybrid of three steps half-way to a wall. Of a distance and a packed normal each look-up makes the plane: it decodes the direction of the texel's middle, unpacks the \
+                 normal, and divides by both. A stored plane is one product of vectors.",
+            )
             .and(Findings::of(&self.beside, search_times::OF_BESIDE))
             .note(
                 "Rays of a mirror sphere of one metre about the map's place, in turns by the search and by the index that scenes have by default. The map has one layer with planes, found by rays; errors \
                  are angles at its place against closest hits, and rays whose hit it does not see are among them. The hybrid of three steps looks up seven distances, each with a direction \
-                 that is encoded, and for its plane one that is decoded and a normal that is unpacked; on a software device that is most of a closest hit, which meets few nodes here.",
+                 that is encoded and a texel's plane; a closest hit meets few nodes here.",
             );
         if self.look_ups.is_empty() {
             return findings;

@@ -1,4 +1,4 @@
-//! What a ray's search in a distance impostor costs on the device: by its steps, and beside a closest hit by the ray index of the same scene.
+//! What a ray's search in a distance impostor costs on the device: by its steps, by what a texel holds, and beside a closest hit by the ray index of the same scene.
 //!
 //! Neither side fetches the radiance of what it finds. Oracle of directions: the closest hits.
 
@@ -8,7 +8,7 @@ use clerestory::gpu::Gpu;
 use clerestory::maps::Parametrization;
 use clerestory::maps::impostor::room::ShinySphere;
 use clerestory::maps::impostor::{
-    Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, SearchMethod,
+    Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, ImpostorTexels, SearchMethod,
 };
 use clerestory::{Result, scene};
 use glam::{DVec3, UVec2, Vec3};
@@ -27,6 +27,8 @@ const TURNS: usize = 9;
 const MOST_STEPS: u32 = 64;
 /// Steps that are timed.
 const STEPS: &[u32] = &[0, 1, 2, 4, 16, MOST_STEPS];
+/// Degrees by which directions are apart that rounding does not tell.
+const APART: f64 = 0.01;
 /// Place of the first of the three that the criterion asks of: drivers may unroll loops of fewer turns.
 const FIRST_JUDGED: usize = 3;
 
@@ -49,6 +51,18 @@ rows! {
         time: Repeats = "time of a ray (ns)",
         added: Option<Repeats> = "what each step added since the row before (ns)",
         before: Option<Repeats> = "the same in that row (ns)",
+    }
+}
+rows! {
+    /// A map in both forms.
+    struct Texels = "What a texel holds" by [map] {
+        map: String = "map",
+        planes_bytes: u64 = "planes (bytes)",
+        normals_bytes: u64 = "distances and normals (bytes)",
+        planes: Repeats = "time of a ray by planes (ns)",
+        normals: Repeats = "time of a ray by distances and normals (ns)",
+        share: Repeats = "planes over distances and normals",
+        apart: f64 = "rays whose directions are more than 0.01° apart (%)",
     }
 }
 rows! {
@@ -77,6 +91,22 @@ pub const OF_STEPS: &[Criterion<Steps>] = &[Criterion::each(
     },
 )
 .among(|row| row.steps == u64::from(MOST_STEPS))];
+
+/// Criteria of what texels hold.
+pub const OF_TEXELS: &[Criterion<Texels>] = &[
+    Criterion::each(
+        "planes cost no more than distances and normals: time over theirs",
+        Bound::AtMost(1.0),
+        |row: &Texels| (&row.share).into(),
+    )
+    .because("they take twice the memory"),
+    Criterion::each(
+        "planes and normals find the same: rays more than 0.01° apart (%)",
+        Bound::AtMost(1.0),
+        |row: &Texels| row.apart.into(),
+    )
+    .because("where a ray ends on the border of two texels, rounding chooses"),
+];
 
 /// Criteria of searches beside closest hits.
 pub const OF_BESIDE: &[Criterion<Beside>] = &[Criterion::each(
@@ -119,6 +149,42 @@ pub fn by_steps(context: &Context<'_>, gpu: &Gpu, map: Parametrization, texels: 
         before: i.checked_sub(1).and_then(added),
     };
     Ok(times.iter().enumerate().map(row).collect())
+}
+
+/// Times of the hybrid of three steps half-way to a wall of an empty room, by planes in turns with distances and normals.
+///
+/// # Errors
+/// Those of the device.
+pub fn by_texels(context: &Context<'_>, gpu: &Gpu, map: Parametrization, texels: f64) -> Result<Vec<Texels>> {
+    let sphere = ShinySphere::B;
+    let rays = sphere.rays(context.pick(SIDE, SMOKE_SIDE), None);
+    let image = ImpostorImage::from_fn(map, map.size_for(texels), 1, true, |d| sphere.room.surfaces(d))?;
+    let hybrid = ImpostorSettings::of(SearchMethod::Hybrid, 3);
+    let (mut impostors, mut searches, mut found) = (Vec::new(), Vec::new(), Vec::new());
+    for holds in [ImpostorTexels::Planes, ImpostorTexels::Normals] {
+        let impostor = Impostor::with_texels(gpu, &image, holds)?;
+        let search = ImpostorSearch::new(gpu, &impostor, &hybrid)?;
+        found.push(search.search_timed(&impostor, &rays)?.0);
+        impostors.push(impostor);
+        searches.push(search);
+    }
+    let pairs = found[0].iter().zip(&found[1]);
+    let apart = pairs.filter(|(a, b)| a.direction.angle_between(b.direction).to_degrees() > APART);
+    let apart = 100.0 * apart.count() as f64 / rays.len().max(1) as f64;
+    let times = context.in_turns(TURNS, searches.len(), |i| {
+        let (_, seconds) = searches[i].search_timed(&impostors[i], &rays)?;
+        Ok(1e9 * seconds / rays.len().max(1) as f64)
+    })?;
+    let [planes, normals] = [0, 1].map(|i: usize| Repeats(times.get(i).cloned().unwrap_or_default()));
+    Ok(vec![Texels {
+        map: map.to_string(),
+        planes_bytes: impostors[0].bytes(),
+        normals_bytes: impostors[1].bytes(),
+        share: planes.over(&normals),
+        planes,
+        normals,
+        apart,
+    }])
 }
 
 /// Times of the hybrid of three steps in turns with those of closest hits of the same rays, in the atrium.

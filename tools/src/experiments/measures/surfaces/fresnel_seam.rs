@@ -11,13 +11,17 @@ use glam::DVec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Study, largest, rows};
 use crate::experiments::measures::Context;
-use crate::metal_forms::{sheet, split_sphere};
+use crate::metal_forms::{seam, sheet, split_sphere};
 
 /// Wavelengths of red, green and blue, nm.
 const WAVELENGTHS: [f64; 3] = [700.0, 550.0, 435.0];
 /// Pixels along a side of a sphere's picture.
 const SIDE: u32 = 160;
 const PICTURES: [&str; 2] = ["rescaled.png", "compensated.png"];
+/// Close-ups of the seam: the file, angles of incidence in degrees, and how many times the difference between the halves is shown.
+const CLOSE_UPS: &str = "close-ups.png";
+const CLOSE_ANGLES: [f64; 3] = [80.0, 75.0, 70.0];
+const MAGNIFIED: [f64; 2] = [1.0, 2.0];
 
 /// Degrees of incidence, and by how much the rescaled curve was published to be above the exact one.
 const PUBLISHED: [(f64, [f64; 3]); 9] = [
@@ -100,6 +104,13 @@ impl Study for Found {
             let spheres = PUBLISHED.map(|(angle, _)| split_sphere(&exact, below, angle, side));
             context.picture(file, &sheet(&spheres, side, 3));
         }
+        let mut close = Vec::new();
+        for below in [&rescaled, &compensated] {
+            for times in MAGNIFIED {
+                close.extend(CLOSE_ANGLES.map(|angle| seam(&exact, below, angle, times, side)));
+            }
+        }
+        context.picture(CLOSE_UPS, &sheet(&close, side, CLOSE_ANGLES.len() as u32));
         Ok(rows)
     }
 
@@ -122,5 +133,9 @@ impl Study for Found {
                 "From 90° (top left) to 50° of incidence, exact above, rescaled below",
             )
             .picture(PICTURES[1], "The same, compensated below")
+            .picture(
+                CLOSE_UPS,
+                "The seam from close by at 80°, 75° and 70°: rescaled below, then with the difference between the halves doubled; compensated below, and again doubled",
+            )
     }
 }
