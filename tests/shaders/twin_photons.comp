@@ -8,6 +8,7 @@
 #include "techniques/photon_mapping/kernel.glsl"
 #include "techniques/photon_mapping/photon_event.glsl"
 #include "techniques/photon_mapping/photon_footprint.glsl"
+#include "techniques/photon_mapping/photon_transmittance.glsl"
 
 Differentials in_differentials(uint i) { return Differentials(in3(i), in3(i + 3u), in3(i + 6u), in3(i + 9u)); }
 
@@ -156,6 +157,13 @@ void main() {
         out1(11u, at.jacobian);
         out1(12u, least_extinction(in3(20u)));
         out1(13u, plane_extinction(in3(23u), in3(20u)));
+        break;
+    }
+    case 10u: {  // steps of walks through grids
+        vec3 passed = in3(3u);
+        bool is_step = attenuate(in3(0u), in_bits(6u), in2(7u), passed);
+        out_bits(0u, is_step ? 1u : 0u);
+        out3(1u, passed);
         break;
     }
     case 7u: {  // footprints in media

@@ -211,7 +211,7 @@ bool gather_events() {
         return true;
     }
     // A march's places reach as far beyond the way's ends as kernels do, and count within alone.
-    float far = min(beam.to, largest_component(beam.reach));
+    float far = min(beam.to, beam.reach);
     bool complete = compact_beam_query(event_root, Ray(beam.origin, beam.from, beam.direction, far));
     count_work(QUERY_STEP_WORK * compact_steps + GRID_ITERATION_WORK * grid_iterations, QUERY_STEP_WORK * WORK_UNIT);
     return complete;

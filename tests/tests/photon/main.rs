@@ -12,6 +12,7 @@ mod flux;
 mod footprints;
 mod furnace;
 mod glow;
+mod grid_transmittance;
 mod lights;
 mod maps;
 mod materials;

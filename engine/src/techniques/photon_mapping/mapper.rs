@@ -26,7 +26,7 @@ use super::settings::{MapBuild, MediaLengths, PhotonSettings};
 use super::tracer::{PhotonAppend, PhotonCounts, PhotonTracer, Tracing, flux_scale};
 use super::volume::event::{PhotonEvent, unpack_event};
 use super::volume::footprint::EventKernelSettings;
-use super::volume::{EventMap, EventMaps};
+use super::volume::{EventMap, EventMaps, paths_in_flight};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
@@ -174,6 +174,7 @@ impl PhotonMapper {
             submission_work: settings.submission_work,
             // What arrives is gathered and counted wave by wave, for each pass of photons.
             full_waves: false,
+            paths_in_flight: paths_in_flight(gpu, &scene),
             ..PathTracerSettings::default()
         };
         let has_map = settings.needs_photons() && sends_photons(&scene);
