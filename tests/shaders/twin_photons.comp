@@ -159,6 +159,10 @@ void main() {
         out1(13u, plane_extinction(in3(23u), in3(20u)));
         break;
     }
+    case 11u: {  // extinction along short beams
+        out3(0u, short_way_extinction(in3(0u), in3(3u)));
+        break;
+    }
     case 10u: {  // steps of walks through grids
         vec3 passed = in3(3u);
         bool is_step = attenuate(in3(0u), in_bits(6u), in2(7u), passed);

@@ -18,6 +18,7 @@ use clerestory::techniques::photon_mapping::volume::plane::{
     PhotonPlane, is_plane, least_extinction, meet_plane, pack_plane, plane_extinction, unpack_plane,
 };
 use clerestory::techniques::photon_mapping::volume::transmittance::attenuate;
+use clerestory::techniques::photon_mapping::volume::ways::short_way_extinction;
 use clerestory::transport::differentials::{
     Differentials, area_light_differentials, camera_differentials, diffuse_reemission, emission_differentials,
     guard_differentials, normal_derivatives, parallel_beam_differentials, reflect_differentials, refract_differentials,
@@ -757,5 +758,23 @@ fn steps_through_grids_agree_with_their_twins() {
             }
         }
         assert!(steps > 300, "{steps}");
+    });
+}
+
+#[test]
+fn short_ways_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(43, |r| {
+            let scatters: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 0.25, 0.5]));
+            let mut all = scatters.to_vec();
+            // One band at least.
+            all[0] = all[0].max(0.25);
+            all.extend(scatters.map(|sigma| sigma.max(0.25) + r.choose(&[0.0, 0.1, 3.0, 100.0])));
+            all
+        });
+        let results = twin_photons(gpu, 11, &table, &[]);
+        judge("short beams", &table, &results, ulps(2.0, 2.0, 0.0), 6, |x| {
+            short_way_extinction(v3(x, 0), v3(x, 3)).to_array().to_vec()
+        });
     });
 }

@@ -32,6 +32,7 @@ pub(in crate::techniques) const CARD: Card = Card {
         tracer::ROWS,
         volume::ROWS,
         volume::transmittance::ROWS,
+        volume::ways::ROWS,
     ],
     bias: BIAS,
     needs: &[],

@@ -180,8 +180,8 @@ impl PhotonMapper {
         let has_map = settings.needs_photons() && sends_photons(&scene);
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            let (plan, estimate) = (settings.plan(has_media), settings.volume);
-            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), estimate)
+            let (plan, stored) = (settings.plan(has_media), (settings.volume, settings.volume_beams));
+            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), stored)
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.

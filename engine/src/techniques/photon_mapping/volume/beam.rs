@@ -9,6 +9,7 @@ use super::VolumeEstimate;
 use super::map::EventMap;
 use super::plane_rays::PlaneRays;
 use super::transmittance::VolumeTransmittance;
+use super::ways::BeamLength;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS, QUEUE_SLOTS, WALK_GROUP, WAY_STEPS,
@@ -127,6 +128,7 @@ impl Beam {
                     sampler_kind: settings.sampler as u32,
                     profile: settings.profile as u32,
                     tabulates,
+                    short_ways: settings.volume_beams == BeamLength::Short,
                     marches: settings.volume == VolumeEstimate::March,
                     beams: settings.volume.stores_ways(),
                     planes: settings.volume.stores_planes(),

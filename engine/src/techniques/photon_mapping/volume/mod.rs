@@ -18,6 +18,7 @@ pub mod plane;
 mod plane_rays;
 mod trace;
 pub mod transmittance;
+pub mod ways;
 
 pub(super) use beam::{Beam, BeamAsk, BeamStage, paths_in_flight};
 pub(super) use map::{EventMap, EventMaps};
@@ -33,7 +34,7 @@ use crate::gpu::shaders::constants::{EVENT_QUARTERS, WIDE_QUARTERS};
 pub enum VolumeEstimate {
     /// The beam estimate: disks across the ray, one query for all of it.
     Ray,
-    /// Beams: ways of photons through homogeneous media as far as the next surface, each seen where the ray passes it.
+    /// Beams: ways of photons through homogeneous media, as far as the next surface or by chance ([`BeamLength`](ways::BeamLength)), each seen where the ray passes it.
     Beams,
     /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else.
     Planes,
