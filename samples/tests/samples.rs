@@ -560,7 +560,7 @@ fn the_photon_viewer_refuses_what_it_cannot_show() {
 fn volume_photons(arguments: &[&str]) -> (image::RgbImage, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("new folder/picture.png");
-    let small = ["--size", "40x40", "--photons", "4096", "--frames", "4"];
+    let small = ["--size", "32x32", "--photons", "4096", "--frames", "4"];
     let output = ["--picture", path.to_str().unwrap()];
     let output = run(
         env!("CARGO_BIN_EXE_volume_photons"),
@@ -573,7 +573,7 @@ fn volume_photons(arguments: &[&str]) -> (image::RgbImage, String) {
 fn photons_in_media_have_the_same_light_by_every_estimate() {
     let [march, ray, beams, planes, unified] = ["march", "ray", "beams", "planes", "unified"].map(|volume| {
         let (picture, text) = volume_photons(&["--volume", volume]);
-        assert_eq!(picture.dimensions(), (40, 40));
+        assert_eq!(picture.dimensions(), (32, 32));
         assert!(
             text.contains(&format!("{volume}, ")) && text.contains(" mm wide"),
             "{text}"
@@ -593,28 +593,36 @@ fn photons_in_media_have_the_same_light_by_every_estimate() {
             );
         }
     }
-    // The same frames again are the same picture.
+}
+
+#[test]
+fn the_same_frames_of_photons_in_media_are_the_same_picture() {
     let again = || volume_photons(&["--volume", "ray", "--turn", "20"]).0;
     assert!(again() == again());
 }
 
-#[test]
-fn the_lamp_in_the_fog_goes_around_and_keys_change_the_estimate() {
+/// The last frame of a window of photons in media, and what was said.
+fn volume_photons_shown(arguments: &[&str]) -> (image::RgbImage, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.png");
-    let shown = |arguments: &[&str]| {
-        let small = ["--size", "40x40", "--photons", "2048"];
-        let output = windowed(
-            env!("CARGO_BIN_EXE_volume_photons"),
-            &[&small[..], arguments].concat(),
-            &path,
-        );
-        assert!(output.status.success(), "{}", said(&output));
+    let small = ["--size", "40x40", "--photons", "2048"];
+    let output = windowed(
+        env!("CARGO_BIN_EXE_volume_photons"),
+        &[&small[..], arguments].concat(),
+        &path,
+    );
+    assert!(output.status.success(), "{}", said(&output));
+    (open(&path), said(&output))
+}
+
+#[test]
+fn the_lamp_in_the_fog_goes_around() {
+    let [(first, _), (third, text)] = ["1", "3"].map(|frames| {
+        let (picture, text) = volume_photons_shown(&["--turn", "90", "--frames", frames]);
         // The ceiling above the lamp, whose circle begins at the left of the picture.
-        let sides = [[0.15, 0.45], [0.55, 0.85]].map(|across| mean(&open(&path), across, [0.04, 0.2])[1]);
-        (sides, said(&output))
-    };
-    let [(first, _), (third, text)] = ["1", "3"].map(|frames| shown(&["--turn", "90", "--frames", frames]));
+        let sides = [[0.15, 0.45], [0.55, 0.85]].map(|across| mean(&picture, across, [0.04, 0.2])[1]);
+        (sides, text)
+    });
     assert!(
         first[0] > 1.1 * first[1] && third[1] > 1.1 * third[0],
         "{first:?} {third:?}"
@@ -622,12 +630,16 @@ fn the_lamp_in_the_fog_goes_around_and_keys_change_the_estimate() {
     for expected in ["ray, ", "kernels a ray", "medians of 2 frames", "photons/s"] {
         assert!(text.contains(expected), "no {expected:?} in {text}");
     }
+}
+
+#[test]
+fn keys_change_the_estimate_of_photons_in_media() {
     for (volume, keys, expected) in [
         ("march", "ee", "unified, "),
         ("unified", "e", "beams, "),
         ("beams", "E", "planes, "),
     ] {
-        let (_, text) = shown(&["--volume", volume, "--keys", keys, "--frames", "2"]);
+        let (_, text) = volume_photons_shown(&["--volume", volume, "--keys", keys, "--frames", "2"]);
         assert!(text.contains(expected), "{text}");
     }
 }

@@ -159,11 +159,20 @@ void main() {
         out1(13u, plane_extinction(in3(23u), in3(20u)));
         break;
     }
-    case 11u: {  // extinction along short beams
+    case 10u: {  // shares of photons and of eye paths
+        float even2 = even_distance2(in1(6u), in1(7u), in1(8u), in1(9u), in1(10u), in_bits(11u) != 0u);
+        out1(0u, even2);
+        out1(1u, eye_share(in1(12u), even2));
+        out1(2u, photon_share(in1(12u), even2));
+        out1(3u, placeless_distance2(in3(0u), in3(3u)));
+        out1(4u, carried_distance2(in1(13u), in_bits(14u), in1(15u), in_bits(16u) != 0u));
+        break;
+    }
+    case 12u: {  // extinction along short beams
         out3(0u, short_way_extinction(in3(0u), in3(3u)));
         break;
     }
-    case 10u: {  // steps of walks through grids
+    case 11u: {  // steps of walks through grids
         vec3 passed = in3(3u);
         bool is_step = attenuate(in3(0u), in_bits(6u), in2(7u), passed);
         out_bits(0u, is_step ? 1u : 0u);

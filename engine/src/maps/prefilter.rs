@@ -13,8 +13,8 @@
 //!
 //! With α = 1 the lobe is n·l: the filtered map times π is the irradiance ([`irradiance`](super::irradiance)).
 
-use super::MapImage;
 use super::directional_map::DirectionalMap;
+use super::{MapImage, Parametrization};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::shaders::constants::PREFILTER_TEXELS_PER_INVOCATION;
 use crate::gpu::shaders::maps::prefilter_ggx as kernel;
@@ -106,9 +106,11 @@ impl PrefilterGgx {
     /// Makes the pipeline for maps as this one.
     ///
     /// # Errors
-    /// [`Error::Setting`] for maps of several layers or of discs; [`Error::OutOfMemory`].
+    /// [`Error::Setting`] for maps of discs; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, map: &DirectionalMap) -> Result<Self> {
-        map.check_one_layer()?;
+        if map.map() != Parametrization::Cube {
+            map.check_one_layer()?;
+        }
         let constants = map.constants();
         let pipeline = gpu.compute_pipeline(&kernel::Spec {
             directional_kind: constants.kind,
@@ -144,8 +146,9 @@ impl PrefilterGgx {
                 return Err(Error::setting("map", map.map(), "is of another kind or border"));
             }
         }
+        let layers = target.map().layers();
         let [width, height] = source.level(from)?.size.map(i64::from);
-        let texels = (width * height).cast_unsigned();
+        let texels = (width * height).cast_unsigned() * u64::from(layers);
         if texels > MAX_TEXELS {
             return Err(Error::LimitExceeded {
                 name: "prefilter".into(),
@@ -159,11 +162,12 @@ impl PrefilterGgx {
             target: level,
             source: from,
             alpha,
+            layers: layers.cast_signed(),
         };
         let set = kernel::Set0 {
             texels: target.texels().view(),
         };
-        let count = (level.size[0] * level.size[1]).cast_unsigned();
+        let count = (level.size[0] * level.size[1]).cast_unsigned() * layers;
         let groups = [
             self.pipeline
                 .groups_for(count.div_ceil(PREFILTER_TEXELS_PER_INVOCATION)),

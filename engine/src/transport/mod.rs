@@ -19,6 +19,7 @@ pub mod packing;
 pub mod path_set;
 pub mod phase;
 pub mod phong;
+pub mod photon_share;
 pub mod random;
 pub mod random_table;
 pub mod shading_normal;

@@ -207,7 +207,7 @@ impl Host {
                     layout: ShadowLayout::Cube,
                     ..PreviewShadows::default()
                 }),
-                has_probes: false,
+                probes: None,
             },
         )?;
 

@@ -22,7 +22,7 @@ use clerestory::maps::impostor::ImpostorSettings;
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{self, LightKind, Material, Mesh, Scene, SceneProfile, metals};
 use clerestory::techniques::preview::{
-    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows, SearchedReflections,
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows, ProbeMap, SearchedReflections,
 };
 use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
@@ -329,13 +329,26 @@ impl Stage {
                 samples: self.settings.samples,
                 lights: self.lights.len() as u32,
                 shadows: self.settings.shadows.map(|shadows| PreviewShadows { suns, ..shadows }),
-                has_probes: true,
+                probes: Some(ProbeMap::Octahedron),
             },
         )
         .map_err(by_option)?;
-        let probe = |side, finest| LiveProbe::new(gpu, scene, &preview, LightProbeDesc { side, finest }, true);
+        let probe = |side, finest| {
+            LiveProbe::new(
+                gpu,
+                scene,
+                &preview,
+                LightProbeDesc {
+                    map: ProbeMap::Octahedron,
+                    side,
+                    finest,
+                },
+                true,
+            )
+        };
         let walls = [probe(WALLS, 64)?, probe(WALLS, 64)?];
         let desc = LightProbeDesc {
+            map: ProbeMap::Octahedron,
             side: self.settings.map,
             finest: 128,
         };

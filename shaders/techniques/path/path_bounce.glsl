@@ -7,6 +7,10 @@
 layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel and sample of its own: adaptive samples, or a wave that is kept full
 #define CLERESTORY_NUMBERED NUMBERED
 
+// Photons of a pass that have a share of the light that paths scatter further behind their first scattering in a medium (transport/photon_share.glsl); 0: none has.
+layout(constant_id = 50) const uint SHARING_PHOTONS = 0u;
+const bool SHARES = SHARING_PHOTONS != 0u;
+
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
     uint path_set;          // PathSet, packed
@@ -18,6 +22,7 @@ layout(push_constant, scalar) uniform Push {
     uint accepting;         // states of the automaton in which light counts, a bit each
     uint successors[15];    // of each state
     float edge_bound;       // of EDGE_BOUND, beyond which paths have the light of an edge
+    float photon_radius;    // of SHARES, within which photons are seen
 } push;
 
 #include "techniques/path/path_roulette.glsl"

@@ -6,6 +6,7 @@
 // sources in transport/medium.glsl and transport/media_tracking.glsl. Emission of homogeneous media is integrated along the way in closed
 // form, that of grids is collected at tentative collisions. Light of points, spots and points of area lights is also sampled equi-angularly
 // where that helps, combined by the power heuristic. Unbiased. Light from infinity does not pass an endless medium that extinguishes.
+// Where photons have the same light (SHARES), paths have the rest of what is scattered more than once, the last time, from the light on, here.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -19,6 +20,7 @@ layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular sample
 #include "transport/features.glsl"
 #include "transport/media_features.glsl"
 #include "transport/path_set.glsl"
+#include "transport/photon_share.glsl"
 #include "techniques/path/path_bounce.glsl"
 #include "techniques/path/path_slots.glsl"
 #include "walk/hand_on.glsl"
@@ -29,6 +31,12 @@ layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular sample
 #include "transport/media_tracking.glsl"
 #include "transport/bodies.glsl"
 #include "transport/phase.glsl"
+
+// What the path under way shares with photons by (path_even_distances).
+float even2 = 0.0;
+
+// Share of the path in light from that squared distance that it scatters at a place of its way.
+float share_here(float light2) { return even2 != 0.0 ? eye_share(light2, abs(even2)) : 1.0; }
 
 // The way from the path's start to the surface.
 struct Way {
@@ -137,6 +145,10 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
     // Collisions choose the light for their place, these samples by its power.
     float gain = light_choice_gain(choice, LightReceiver(from, vec3(0.0)));
     float weight = light_weight(gain * seen.pdf, phase) * power_heuristic(pdf, gain * reckoned_collision_density(m, bands, t, walk));
+    if (SHARES) {
+        vec3 to = seen.point.position - from;
+        weight *= share_here(dot(to, to));
+    }
     vec3 contribution = path.throughput * passed * scattered * seen.radiance * (phase * weight / pdf);
     if (contribution == vec3(0.0)) {
         return false;
@@ -165,6 +177,10 @@ uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, S
             weight *= power_heuristic(gain * reckoned_collision_density(m, bands, t, walk), equi_angular_pdf(e, t));
         }
     }
+    if (SHARES) {
+        vec3 to = light.point.position - from;
+        weight *= share_here(light.infinite ? placeless_distance2(push.scene_lower, push.scene_upper) : dot(to, to));
+    }
     ShadowRay ray = shadow_ray(slot, path, from, light.point.position, path.throughput * light.radiance * (phase * weight));
     if (light.infinite) {
         ray.t_max = FAR_AWAY;
@@ -182,6 +198,12 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
     vec3 wi = normalize(phase_direction(path.direction, c, u.y));
     path.pdf = phase_function(m.phase, m.phase_parameter, path.direction, wi);
+    if (SHARES) {
+        bool has_beams = !(HAS_GRIDS && m.has_grid != 0u);
+        float sine = length(cross(path.direction, wi));
+        float first2 = even_distance2(path.pdf, sine, mean_extinction(m.sigma_t), push.photon_radius, float(SHARING_PHOTONS), has_beams);
+        even2 = even2 == 0.0 ? -first2 : abs(even2);
+    }
     if (HAS_LIGHT_TREE) {
         path_receivers[slot] = LightReceiver(at, vec3(0.0));
     }
@@ -217,6 +239,9 @@ void main() {
     MediumState state = MediumState(vec3(1.0 / 3.0), 0.0);
     if (status.rounds > 0u) {
         state = walk_medium_states[slot];
+        if (SHARES) {
+            even2 = path_even_distances[slot];
+        }
     }
     Hit hit = load_hit(place);
     Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
@@ -303,6 +328,9 @@ void main() {
         }
         COUNT_MEDIUM(collisions, outcome == GRID_COLLIDED ? 1u : 0u)
         if (counted && emitted != vec3(0.0)) {
+            if (SHARES && even2 > 0.0) {
+                emitted *= eye_share(placeless_distance2(push.scene_lower, push.scene_upper), even2);
+            }
             walk_gathered[slot].radiance += emitted;
         }
     }
@@ -338,6 +366,9 @@ void main() {
     }
     walk_gathered[slot].interior = interior;
     walk_medium_states[slot] = state;
+    if (SHARES) {
+        path_even_distances[slot] = even2;
+    }
     walk_medium_events[place] = MediumEvent(weight, (flags & FLAG_AIRLIGHT) | (handled ? EVENT_HANDLED : 0u));
     walk_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);
     if (alive) {

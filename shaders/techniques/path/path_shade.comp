@@ -17,6 +17,7 @@ layout(local_size_x = 64) in;
 #include "transport/edge_bound.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/path_set.glsl"
+#include "transport/photon_share.glsl"
 #include "techniques/path/path_bounce.glsl"
 #include "walk/hand_on.glsl"
 
@@ -24,6 +25,12 @@ layout(local_size_x = 64) in;
 
 // Other means have the light of edges between two rough scatterings up to this bound; paths have what it leaves out.
 layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
+
+// What the path under way shares with photons by (path_even_distances).
+float even2 = 0.0;
+
+// Share of the path in light of lights that it meets, behind a scattering that shares: that before was the first one otherwise.
+float share_behind(float light2) { return even2 > 0.0 ? eye_share(light2, even2) : 1.0; }
 
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
@@ -54,6 +61,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
             vec3 local = world_to_environment(e, path.direction);
             vec4 seen = environment_look_up(e, local);
             float weight = emission_weight(path.pdf, environment_choice_probability() * seen.a);
+            if (SHARES) {
+                weight *= share_behind(placeless_distance2(push.scene_lower, push.scene_upper));
+            }
             radiance += path.throughput * seen.rgb * weight;
         }
         return;
@@ -73,7 +83,12 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         vec3 emission = surface_emission(m, s, a.wo);
         if (emission != vec3(0.0)) {
             float light_pdf = HAS_AREA_LIGHTS && s.light != NO_LIGHT ? emitter_pdf(slot, path, s, hit.t) : 0.0;
-            radiance += path.throughput * emission * emission_weight(path.pdf, light_pdf);
+            float weight = emission_weight(path.pdf, light_pdf);
+            // What sends no photons is the paths' alone.
+            if (SHARES && HAS_AREA_LIGHTS && s.light != NO_LIGHT) {
+                weight *= share_behind(hit.t * hit.t);
+            }
+            radiance += path.throughput * emission * weight;
         }
     }
 
@@ -123,6 +138,11 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
             vec4 f = bsdf_eval_part(bsdf, frame.wo, world_to_frame(frame, wi), mask, lit_mask);
             if (f.rgb != vec3(0.0)) {
                 float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, f.a) : 1.0;
+                if (SHARES && even2 != 0.0) {
+                    vec3 to = light.point.position - s.point.position;
+                    float light2 = light.infinite ? placeless_distance2(push.scene_lower, push.scene_upper) : dot(to, to);
+                    weight *= eye_share(light2, abs(even2));
+                }
                 ShadowRay ray_to_light;
                 ray_to_light.slot = slot;
                 ray_to_light.bounce = bounce + 1u;
@@ -181,6 +201,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     if (EDGE_BOUND == EDGE_GEOMETRY) {
         path_departures[slot] = abs(dot(path.direction, s.geometric_normal));
     }
+    if (SHARES) {
+        path_even_distances[slot] = abs(even2);
+    }
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);
     }
@@ -209,6 +232,9 @@ void main() {
         }
         flags = (event.flags & FLAG_AIRLIGHT) != 0u ? FLAG_AIRLIGHT | FLAG_WAITING : 0u;
         path.throughput *= event.weight;
+    }
+    if (SHARES) {
+        even2 = path_even_distances[slot];
     }
     shade(slot, place, path, radiance, flags);
     if (radiance != vec3(0.0)) {

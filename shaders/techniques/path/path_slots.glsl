@@ -1,4 +1,4 @@
-// What paths keep by slot beside their walks: the first surface that they see, and where they were scattered last.
+// What paths keep by slot beside their walks: the first surface that they see, where they were scattered last, and what photons have of their light.
 #ifndef CLERESTORY_TECHNIQUES_PATH_PATH_SLOTS_GLSL
 #define CLERESTORY_TECHNIQUES_PATH_PATH_SLOTS_GLSL
 
@@ -19,5 +19,7 @@ layout(set = 1, binding = 0, scalar) restrict buffer PathAovs { PathAov path_aov
 layout(set = 1, binding = 1, scalar) restrict buffer PathReceivers { LightReceiver path_receivers[]; };
 // Cosine to the geometric normal under which a path left where it was scattered last, where edges are bounded by their geometry term; elsewhere as above.
 layout(set = 1, binding = 2, scalar) restrict buffer PathDepartures { float path_departures[]; };
+// Of paths that share light with photons what even_distance2 says, from the first scattering in a medium on; 0 before, and negative until the next scattering. Elsewhere as above.
+layout(set = 1, binding = 3, scalar) restrict buffer PathEvenDistances { float path_even_distances[]; };
 
 #endif

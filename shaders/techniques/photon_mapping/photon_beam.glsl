@@ -7,7 +7,7 @@
 // flights in the band that comes farthest do, it is what other bands have less of.
 // Of planes L = sum_j tau(t_j) sigma_s^2 p(w_j', -v) tau_j' Phi_j / |v . (w_j x w_j')| with the directions w_j and w_j' of both flights, and tau_j' what is left there of other
 // bands than the one that flights end as in: without blur. One of those that a ray meets has a ray that tells whether it is seen (photon_plane_ray.glsl).
-// Where collisions are stored beside beams each has the share of the balance heuristic (point_share).
+// Where collisions are stored beside beams each has the share of the balance heuristic (point_share). Where eye paths go on, both have but the share that these leave (photons_share).
 // Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Events count in their own medium alone.
 //
 // With a queue (QUEUE) photon_beam_ways.comp has been to all places, and an invocation takes one of those that ask; without one an invocation per place first finds its way
@@ -95,6 +95,12 @@ float share_of_points(float flight, float sine) {
 // What takes from light along a beam.
 vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s, beam.m.sigma_t) : beam.m.sigma_t; }
 
+// Share of a record's light that eye paths which go on leave to photons, by the density of its phase function.
+float photons_share(uvec4 q2, float phase, float sine, bool has_beams) {
+    float even2 = even_distance2(phase, sine, mean_extinction(beam.m.sigma_t), push.radius, push.photons, has_beams);
+    return photon_share(unpack_light(q2), even2);
+}
+
 // Adds a beam's light where the ray passes it.
 void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
     PhotonBeam b = unpack_beam(q0, q1);
@@ -107,7 +113,11 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
         if (at.sine > 0.0 && relative < 1.0 && at.along >= 0.0 && at.along < reach && at.t > beam.from && at.t < beam.to) {
             vec3 passed = passed_to(at.t) * transmittance(way_extinction(), at.along);
             float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
-            weight *= phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+            float phase = phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+            weight *= phase;
+            if (TELLS_LIGHTS) {
+                weight *= photons_share(q2, phase, at.sine, true);
+            }
             if (POINTS) {
                 weight *= 1.0 - share_of_points(unpack_flight(q2) + at.along, at.sine);
             }
@@ -177,12 +187,17 @@ bool compact_visit_beam(uint record) {
             : kernel_profile(PROFILE, approach.y / (radius * radius)) / (radius * radius) * passed_to(approach.x);
         if (weight != vec3(0.0)) {
             PhotonEvent e = unpack_event(q0, q1);
+            float phase = phase_function(beam.m.phase, beam.m.phase_parameter, e.direction, -beam.direction);
+            float sine = POINTS ? length(cross(e.direction, beam.direction)) : 0.0;
             // In grids there are no beams.
             if (POINTS && !(HAS_GRIDS && beam.m.has_grid != 0u)) {
-                weight *= share_of_points(unpack_flight(q2), length(cross(e.direction, beam.direction)));
+                weight *= share_of_points(unpack_flight(q2), sine);
+            }
+            if (TELLS_LIGHTS) {
+                weight *= photons_share(q2, phase, sine, !(HAS_GRIDS && beam.m.has_grid != 0u));
             }
             ++gathered_events;
-            gathered += weight * phase_function(beam.m.phase, beam.m.phase_parameter, e.direction, -beam.direction) * e.flux;
+            gathered += weight * phase * e.flux;
         }
     }
     return !event_ends_leaf(q0);

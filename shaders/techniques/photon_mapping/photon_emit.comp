@@ -22,6 +22,7 @@ layout(push_constant, scalar) uniform Push {
     uint photons;  // of the pass
     float share;   // of them that lights send
     float weight;  // of these, the reciprocal
+    float placeless2;  // carried by photons from infinity, m2 (transport/photon_share.glsl); 0 where none tell their light
 } push;
 
 #include "walk/draws.glsl"
@@ -55,7 +56,7 @@ void main() {
     Emission e = emit(point, sampler_bits(walk_sampler(slot, DIMENSION_START_DIRECTION)), push.scene_lower, push.scene_upper, push.radius);
     uint bounce = path_set_joined(0u, PHOTON_UNDIFFUSED);
     float survival = EVEN_SURVIVAL ? even_survival(slot) : 1.0;
-    walk_states_out[slot] = WalkState(e.origin, survival, normalize(e.direction), bounce, e.power * push.weight, 0.0);
+    walk_states_out[slot] = WalkState(e.origin, survival, normalize(e.direction), bounce, e.power * push.weight, e.infinite ? push.placeless2 : 0.0);
     walk_gathered[slot] = GatheredLight(vec3(0.0), e.interior);
     if (HAS_DIFFERENTIALS) {
         // Only so many photons are of this light.

@@ -10,6 +10,7 @@
 #include "accel/ray.glsl"
 #include "techniques/photon_mapping/kernel.glsl"
 #include "techniques/photon_mapping/photon_history.glsl"
+#include "transport/photon_share.glsl"
 
 const uint EVENT_QUARTERS = 2u;
 // Of all records of a map that has another kind beside beams.
@@ -101,9 +102,11 @@ PhotonPlane unpack_plane(uvec4 q0, uvec4 q1, uvec4 q2) {
 
 bool is_plane(uvec4 q2) { return uintBitsToFloat(q2.xyz) != vec3(0.0); }
 
-// A collision beside beams: its third quarter also has the flight that it ends. That of a beam says how long the flight before the beam's beginning was.
-uvec4 pack_flight(float flight, uint kind) { return uvec4(floatBitsToUint(flight), 0u, 0u, kind); }
+// A collision beside beams: its third quarter also has the flight that it ends. That of a beam says how long the flight before the beam's beginning was. Both have the squared distance at
+// which the photon's light was from its first scattering, m2, or 0 where no eye path finds it.
+uvec4 pack_flight(float flight, float light2, uint kind) { return uvec4(floatBitsToUint(flight), floatBitsToUint(light2), 0u, kind); }
 float unpack_flight(uvec4 q2) { return uintBitsToFloat(q2.x); }
+float unpack_light(uvec4 q2) { return uintBitsToFloat(q2.y); }
 bool is_point(uvec4 q2) { return q2.w == POINT_RECORD; }
 
 // Share that the estimate by collisions has of light that one by beams has, too, in media of this mean extinction: the balance heuristic. A photon collides within the disk of a
@@ -113,8 +116,6 @@ float point_share(float extinction, float flight, float point_radius, float beam
     float both = points + 2.0 * beam_radius * sine;
     return both > 0.0 ? points / both : 1.0;
 }
-
-float mean_extinction(vec3 sigma_t) { return (sigma_t.x + sigma_t.y + sigma_t.z) / 3.0; }
 
 // Extinction of the band through which light comes farthest, of those with any.
 float least_extinction(vec3 sigma_t) {

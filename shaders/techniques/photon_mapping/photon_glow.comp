@@ -32,6 +32,7 @@ layout(push_constant, scalar) uniform Push {
     uint bodies;
     uint surrounding;  // index of the medium outside all bodies, or NO_MEDIUM
     uint outside;      // stands for the material of a body where there is none around
+    float placeless2;  // carried by photons, m2 (transport/photon_share.glsl); 0 where none tell their light
 } push;
 
 #include "walk/draws.glsl"
@@ -113,7 +114,7 @@ void main() {
     }
     vec3 w = square_to_sphere(vec2(unit_float(direction.x), unit_float(direction.y)));
     vec3 power = found && medium == source.medium ? source.power / push.share : vec3(0.0);
-    walk_states_out[slot] = WalkState(at, 1.0, normalize(w), path_set_joined(0u, PHOTON_UNDIFFUSED), power, 0.0);
+    walk_states_out[slot] = WalkState(at, 1.0, normalize(w), path_set_joined(0u, PHOTON_UNDIFFUSED), power, push.placeless2);
     walk_gathered[slot] = GatheredLight(vec3(0.0), interior);
     if (HAS_DIFFERENTIALS) {
         Differentials d = area_light_differentials(w, 0.25 * INV_PI, 1.0 / (source.side * source.side), 4.0 * PI);

@@ -24,6 +24,7 @@ layout(local_size_x = 64) in;
 #include "techniques/photon_mapping/photon_footprint.glsl"
 #include "techniques/photon_mapping/photon_volume.glsl"
 #include "transport/path_set.glsl"
+#include "transport/photon_share.glsl"
 #include "walk/media.glsl"
 
 layout(constant_id = 61) const bool SHORT_WAYS = false;  // ways end by chance
@@ -71,6 +72,9 @@ float radius_in(SceneMedium m, float radius) {
     return push.path_share > 0.0 ? min(radius, push.path_share / densest) : radius;
 }
 
+// What a record says of the photon's light.
+float told_light(WalkState photon) { return TELLS_LIGHTS && path_set_bounce(photon.bounce) > 0u ? photon.pdf : 0.0; }
+
 // Stores the photon's way through a homogeneous medium, `reach` long.
 uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
     uint bounce = path_set_bounce(photon.bounce);
@@ -86,6 +90,7 @@ uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedi
     way.bounce = HAS_CLASSES ? path_set_state(photon.bounce) : bounce;
     way.sigma_t = SHORT_WAYS ? short_way_extinction(m.sigma_s, m.sigma_t) : m.sigma_t;
     way.pieces = pieces;
+    way.light2 = told_light(photon);
     photon_ways[place] = way;
     return FLAG_WAITING | FLAG_VOLUME;
 }
@@ -152,7 +157,7 @@ uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, floa
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
     pack_event(PhotonEvent(at, photon.direction, flux, radius, medium, history), q0, q1);
     if (STORES_POINTS) {
-        return store_beside(place, q0, q1, pack_flight(flight, POINT_RECORD));
+        return store_beside(place, q0, q1, pack_flight(flight, told_light(photon), POINT_RECORD));
     }
     store_waiting(place, q0, q1, uvec4(0u));
     return FLAG_WAITING | FLAG_VOLUME;
@@ -179,6 +184,9 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
     if (HAS_DIFFERENTIALS) {
         float phase = phase_function(m.phase, m.phase_parameter, photon.direction, wi);
         photon_medium_differentials[slot] = scattered_in_medium(f.across, f.pdf, f.here, survival, wi, phase);
+    }
+    if (TELLS_LIGHTS) {
+        photon.pdf = carried_distance2(photon.pdf, bounce, distance(photon.origin, at), true);
     }
     photon.direction = wi;
     photon.origin = at;

@@ -22,6 +22,7 @@ layout(local_size_x = 64) in;
 #include "transport/arrival.glsl"
 #include "transport/bsdf_label.glsl"
 #include "transport/path_set.glsl"
+#include "transport/photon_share.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -209,7 +210,9 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     photon.throughput = flux / survival;
     photon.origin = departure(a, wi, photon.throughput);
     photon.direction = normalize(wi);
-    if (HAS_MEDIA) {
+    if (TELLS_LIGHTS) {
+        photon.pdf = carried_distance2(photon.pdf, bounce, hit.t, (scattered.flags & (LOBE_DIFFUSE | LOBE_GLOSSY)) != 0u);
+    } else if (HAS_MEDIA) {
         photon.pdf = PHOTON_FROM_ELSEWHERE;
     }
     photon.bounce = path_set_joined(bounce + 1u, diffused);

@@ -26,6 +26,7 @@ struct PhotonWay {
     uint bounce;
     vec3 sigma_t;
     uint pieces;  // to be stored as so many beams
+    float light2;  // as records have it
 };
 
 

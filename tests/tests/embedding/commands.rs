@@ -214,7 +214,7 @@ fn preview(gpu: &Gpu, scene: &GpuScene) -> Preview {
             width: 1,
             suns: 0,
         }),
-        has_probes: false,
+        probes: None,
     };
     Preview::new(gpu, scene, desc).unwrap()
 }

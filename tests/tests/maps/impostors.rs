@@ -4,6 +4,7 @@ use clerestory::Error;
 use clerestory::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery};
 use clerestory::gpu::{BufferDesc, Category, Gpu, GpuOptions, Lesser};
 use clerestory::maps::impostor::layouts::{ImpostorLayout, ImpostorLayouts};
+use clerestory::maps::impostor::published;
 use clerestory::maps::impostor::room::{BoxRoom, ShinySphere};
 use clerestory::maps::impostor::{
     Impostor, ImpostorHit, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, SearchMethod,
@@ -65,29 +66,26 @@ fn share_that_differs(
 fn convex_rooms_give_the_published_errors() {
     use SearchMethod::{Classical, FalsePosition, Mixed, SecantFromGuess};
     with_gpu(|gpu| {
-        let published = [
-            (Classical, 0, [11.96, 30.88]),
-            (SecantFromGuess, 0, [0.010, 0.712]),
-            (FalsePosition, 3, [0.001, 0.419]),
-            (Mixed, 3, [0.0, 0.045]),
-        ];
+        let searched = [(Classical, 0), (SecantFromGuess, 0), (FalsePosition, 3), (Mixed, 3)];
+        let mut searches = published::in_the_empty_room();
+        searches.retain(|search| {
+            let is_searched = searched.contains(&(search.settings.method, search.settings.steps));
+            is_searched && [ShinySphere::B, ShinySphere::C].contains(&search.sphere)
+        });
+        assert_eq!(searches.len(), 8);
         for map in MAPS {
             let (image, impostor) = room(gpu, map, BoxRoom::EMPTY, 1);
-            for (method, steps, published) in published {
-                let settings = ImpostorSettings::of(method, steps);
-                for (sphere, published) in [ShinySphere::B, ShinySphere::C].into_iter().zip(published) {
-                    let rays = sphere.rays(SIDE, None);
-                    let hits = impostor.search(&rays, &settings).unwrap();
-                    near(
-                        &format!("{map} {} {method} +{steps}", sphere.name),
-                        mean(&errors(&sphere, &rays, &hits)),
-                        published,
-                    );
-                    let off = share_that_differs(&image, &rays, &hits, &settings);
-                    assert!(off < 0.01, "{map} {} {method} +{steps}: {off}", sphere.name);
-                    let unit = |hit: &ImpostorHit| (hit.direction.length() - 1.0).abs() < 1e-6;
-                    assert!(hits.iter().all(unit), "{map} {} {method}", sphere.name);
-                }
+            for search in &searches {
+                let (sphere, settings) = (search.sphere, search.settings);
+                let rays = sphere.rays(SIDE, None);
+                let hits = impostor.search(&rays, &settings).unwrap();
+                let what = format!("{map} {} {} +{}", sphere.name, settings.method, settings.steps);
+                let published = search.figures.mean.unwrap();
+                near(&what, mean(&errors(&sphere, &rays, &hits)), published);
+                let off = share_that_differs(&image, &rays, &hits, &settings);
+                assert!(off < 0.01, "{what}: {off}");
+                let unit = |hit: &ImpostorHit| (hit.direction.length() - 1.0).abs() < 1e-6;
+                assert!(hits.iter().all(unit), "{what}");
             }
         }
     });
@@ -96,17 +94,12 @@ fn convex_rooms_give_the_published_errors() {
 /// The first interface of a glass sphere, by the index of glass.
 #[test]
 fn refracted_rays_are_found_as_published() {
-    use SearchMethod::{Classical, FalsePosition, SecantFromGuess};
     with_gpu(|gpu| {
         let sphere = ShinySphere::B;
         let rays = sphere.rays(SIDE, Some(1.5));
         for map in MAPS {
             let (image, impostor) = room(gpu, map, sphere.room, 1);
-            for (method, steps, published) in [
-                (Classical, 0, 17.28),
-                (SecantFromGuess, 0, 0.073),
-                (FalsePosition, 3, 0.004),
-            ] {
+            for (method, steps, published) in published::REFRACTED {
                 let settings = ImpostorSettings::of(method, steps);
                 let hits = impostor.search(&rays, &settings).unwrap();
                 let what = format!("{map} glass {method} +{steps}");
@@ -127,8 +120,12 @@ fn hidden_points_need_the_hybrid() {
         let seen: Vec<ImpostorRay> = rays.iter().copied().filter(|ray| sphere.room.sees_hit(ray)).collect();
         for map in MAPS {
             let (image, impostor) = room(gpu, map, BoxRoom::PILLAR, 1);
-            for (method, published) in [(FalsePosition, 70.0), (Hybrid, 2.1)] {
-                let settings = ImpostorSettings::of(method, 10);
+            for search in published::behind_the_pillar() {
+                let (settings, method) = (search.settings, search.settings.method);
+                if ![FalsePosition, Hybrid].contains(&method) {
+                    continue;
+                }
+                let published = search.figures.seen.unwrap();
                 let hits = impostor.search(&seen, &settings).unwrap();
                 near(
                     &format!("{map} P2 {method}"),
@@ -151,7 +148,8 @@ fn three_layers_hold_what_lies_behind() {
         };
         for map in MAPS {
             let (_, impostor) = room(gpu, map, BoxRoom::PILLAR, 3);
-            for (sphere, published) in [(ShinySphere::P1, 98.7), (ShinySphere::P2, 99.1)] {
+            for search in published::in_layers().iter().filter(|search| search.layers == 3) {
+                let (sphere, published) = (search.sphere, search.figures.good.unwrap());
                 let rays = sphere.rays(SIDE, None);
                 let errors = errors(&sphere, &rays, &impostor.search(&rays, &settings).unwrap());
                 let good = 100.0 * errors.iter().filter(|error| **error < 1.0).count() as f64 / errors.len() as f64;

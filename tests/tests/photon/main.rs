@@ -21,6 +21,7 @@ mod planes;
 mod queues;
 mod scale;
 mod settings;
+mod shared_paths;
 mod short_beams;
 mod sphere;
 mod traps;

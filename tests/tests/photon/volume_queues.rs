@@ -2,7 +2,9 @@
 
 use super::queues::FORMS;
 use super::volume::{coloured, direct, endless, lit_box, uneven};
+use super::volume_truths::ESTIMATES;
 use super::*;
+use clerestory::gpu::Category;
 use clerestory::scene::{Medium, Phase};
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
 use clerestory::techniques::photon_mapping::{GatherCounts, MapQueue, RayFetches};
@@ -15,6 +17,11 @@ use glam::DVec3;
 /// Set in the processes that only print their pictures' hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_VOLUME_QUEUE_HASH";
 const CHILD_TEST: &str = "volume_queues::prints_its_hash_when_asked";
+
+/// The same for one estimate, which the second variable names.
+const ESTIMATE_CHILD: &str = "CLERESTORY_TEST_PRINT_ESTIMATE_HASH";
+const ESTIMATE: &str = "CLERESTORY_TEST_ESTIMATE";
+const ESTIMATE_CHILD_TEST: &str = "volume_queues::prints_the_hash_of_an_estimate_when_asked";
 
 type Form = (MapQueue, MapQuery);
 
@@ -155,18 +162,6 @@ fn queues_and_packets_go_through_grids() {
     with_gpu(|gpu| {
         let all = expect_alike(gpu, &boxes(uneven(coloured())), &asked(1 << 13, 0.1), &FEW_FORMS);
         assert!(all[0].beams.photons > all[0].beams.queries && all[0].beams.queries > 0);
-    });
-}
-
-#[test]
-fn queues_and_packets_see_planes_and_beams() {
-    with_gpu(|gpu| {
-        let settings = PhotonSettings {
-            volume: VolumeEstimate::Planes,
-            ..asked(1 << 10, 0.05)
-        };
-        let all = expect_alike(gpu, &boxes(coloured()), &settings, &[FORMS[0], FORMS[5]]);
-        assert!(all[0].beams.rays > 0 && all[0].beams.photons > 0, "{:?}", all[0].beams);
     });
 }
 
@@ -335,10 +330,99 @@ fn queues_and_packets_of_rays_are_made_for_media_alone() {
 }
 
 #[test]
+fn points_and_rays_share_the_memory_of_their_queues() {
+    with_gpu(|gpu| {
+        // Bytes to work in that a queue adds.
+        let work = |scene: &Scene, queue| {
+            let settings = PhotonSettings {
+                queue,
+                ..asked(1 << 8, 0.1)
+            };
+            let before = gpu.memory_report().of(Category::Work);
+            let mapper = mapper(gpu, scene, &settings);
+            let bytes = gpu.memory_report().of(Category::Work) - before;
+            drop(mapper);
+            bytes
+        };
+        let (room, fog) = (builtin("builtin:cornell-box"), lit_box(coloured()));
+        for queue in [MapQueue::Compacted, MapQueue::Blocks] {
+            let [of_points, of_both] = [&room, &fog].map(|scene| work(scene, queue) - work(scene, MapQueue::Slots));
+            // A word a place at least.
+            assert!(of_points > 4 * PLACES, "{queue:?}: {of_points}");
+            assert_eq!(of_both, of_points, "{queue:?}");
+        }
+    });
+}
+
+#[test]
 fn queues_and_packets_never_show_on_any_number_of_threads() {
     let hash = |threads| hash_in_child(CHILD_TEST, CHILD, &[("LP_NUM_THREADS", threads)]);
     let truth = hash("1");
     assert_eq!(hash("2"), truth, "two threads");
+}
+
+/// Fails unless all six forms of an estimate make the same, in processes with one thread and with two.
+fn expect_the_same_on_threads(volume: VolumeEstimate) {
+    let name = format!("{volume:?}");
+    let hash = |threads| {
+        let variables = [("LP_NUM_THREADS", threads), (ESTIMATE, name.as_str())];
+        hash_in_child(ESTIMATE_CHILD_TEST, ESTIMATE_CHILD, &variables)
+    };
+    let truth = hash("1");
+    assert_eq!(hash("2"), truth, "two threads");
+}
+
+#[test]
+fn marches_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::March);
+}
+
+#[test]
+fn beams_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::Beams);
+}
+
+#[test]
+fn planes_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::Planes);
+}
+
+#[test]
+fn unified_estimates_are_the_same_in_every_form_on_any_number_of_threads() {
+    expect_the_same_on_threads(VolumeEstimate::Unified);
+}
+
+#[test]
+fn prints_the_hash_of_an_estimate_when_asked() {
+    if std::env::var_os(ESTIMATE_CHILD).is_none() {
+        return;
+    }
+    let name = std::env::var(ESTIMATE).unwrap();
+    let mut estimates = ESTIMATES.into_iter();
+    let volume = estimates.find(|volume| format!("{volume:?}") == name).unwrap();
+    let gpu = gpu();
+    let settings = PhotonSettings {
+        volume,
+        ..asked(1 << 10, 0.05)
+    };
+    let mut cases = vec![(boxes(coloured()), &FORMS[..])];
+    if !matches!(volume, VolumeEstimate::Beams | VolumeEstimate::Planes) {
+        cases.push((boxes(uneven(coloured())), &FEW_FORMS[..]));
+    }
+    let mut words: Vec<u32> = Vec::new();
+    for (scene, forms) in &cases {
+        let all = expect_alike(&gpu, scene, &settings, forms);
+        let beams = all[0].beams;
+        assert!(
+            beams.queries > 0 && beams.photons > 0 && all[0].stalls == 0,
+            "{beams:?}"
+        );
+        assert_eq!(beams.rays > 0, volume == VolumeEstimate::Planes, "{beams:?}");
+        words.extend_from_slice(&all[0].bits);
+        words.extend([beams.queries as u32, beams.photons as u32, beams.rays as u32]);
+    }
+    print_hash(words);
+    clerestory_tests::assert_no_messages(&gpu);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //!
 //! Values for isotropic scattering are those of the path tracer's tests (`tests/tests/media`): integral equations of slabs and of point sources.
 
-use super::volume::{all_events, direct, endless};
+use super::volume::{direct, endless};
 use super::*;
 use clerestory::scene::{Camera, Medium, Phase, Projection};
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
@@ -11,7 +11,7 @@ use clerestory_tests::statistics::expect_mean_of;
 use clerestory_tests::with_gpu;
 use glam::DVec3;
 
-const ESTIMATES: [VolumeEstimate; 5] = [
+pub(super) const ESTIMATES: [VolumeEstimate; 5] = [
     VolumeEstimate::Ray,
     VolumeEstimate::March,
     VolumeEstimate::Beams,
@@ -87,7 +87,8 @@ fn slabs_have_the_radiance_of_the_tables() {
 #[test]
 fn rays_past_a_source_have_the_exact_multiple_scattering() {
     with_gpu(|gpu| {
-        for (albedo, h, photons, expected) in [(0.5, 0.5, 1 << 13, 4.22674e-4), (0.9, 1.0, 1 << 12, 2.27478e-3)] {
+        // Passes are many and small: Student's t of few has long tails, by which faults would pass.
+        for (albedo, h, photons, expected) in [(0.5, 0.5, 1 << 10, 4.22674e-4), (0.9, 1.0, 1 << 9, 2.27478e-3)] {
             let mut scene = endless(medium(1.0, albedo, Phase::Isotropic));
             scene.cameras = vec![parallel(DVec3::new(-3.0, h, 0.0), DVec3::X, 1e-6)];
             for volume in ESTIMATES {
@@ -103,7 +104,7 @@ fn rays_past_a_source_have_the_exact_multiple_scattering() {
                 };
                 // Scattered light changes by the distance from the source, which blur evens out by its square.
                 let what = format!("albedo {albedo}, {h} m away, {volume:?}");
-                means(gpu, &scene, &settings, 8).expect(&what, 0, 0, exactly(expected), 2e-2);
+                means(gpu, &scene, &settings, 16).expect(&what, 0, 0, exactly(expected), 2e-2);
             }
         }
     });
@@ -118,12 +119,12 @@ fn collisions_about_a_source_are_those_of_the_exact_fluence() {
             (0.9, 2.0, 3.44340e-2),
         ] {
             let scene = endless(medium(1.0, albedo, Phase::Isotropic));
-            let settings = direct(1 << 13);
+            let mut mapper = mapper(gpu, &scene, &direct(1 << 11));
             // What collides in a shell scatters its albedo: 4π r² φ of it a metre, which is nearly straight over a tenth of the radius.
             let whole = 4.0 * PI * r * r * (collided + (-r).exp() / (4.0 * PI * r * r));
-            let passes: Vec<f64> = (0..6)
+            let passes: Vec<f64> = (0..12)
                 .map(|pass| {
-                    let (events, _) = all_events(gpu, &scene, &settings, pass);
+                    let events = mapper.events(pass).unwrap_or_else(|error| panic!("{error}"));
                     let within = |distance: f64| (distance / r - 1.0).abs() < 0.1;
                     let events = events.iter().map(|e| e.event);
                     let in_shell = events.filter(|e| within(e.position.as_dvec3().length()));
@@ -165,10 +166,10 @@ fn furnaces_stay_even_with_lossless_media_inside() {
                     volume,
                     volume_radius: 0.1,
                     radius: 0.2,
-                    photons: 1 << 11,
+                    photons: 1 << 9,
                     ..settings("all")
                 };
-                let found = means(gpu, &room, &settings, 6);
+                let found = means(gpu, &room, &settings, 12);
                 for channel in 0..3 {
                     found.expect(&format!("{what}, {volume:?}"), 0, channel, exactly(2.0), bias);
                 }

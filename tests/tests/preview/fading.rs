@@ -3,7 +3,7 @@
 use clerestory::gpu::Gpu;
 use clerestory::scene::{Camera, Material, Scene};
 use clerestory::techniques::preview::{
-    FadingProbe, LightProbeDesc, Preview, PreviewDesc, PreviewPart, Refresh, RefreshStep,
+    FadingProbe, LightProbeDesc, Preview, PreviewDesc, PreviewPart, ProbeMap, Refresh, RefreshStep,
 };
 use clerestory::transport::GpuScene;
 use clerestory_tests::with_gpu;
@@ -13,7 +13,18 @@ use crate::live::room;
 use crate::subject::sphere;
 
 const SIZE: u32 = 24;
-const DESC: LightProbeDesc = LightProbeDesc { side: 64, finest: 32 };
+const DESC: LightProbeDesc = LightProbeDesc {
+    map: ProbeMap::Octahedron,
+    side: 64,
+    finest: 32,
+};
+
+/// Of a cube, with half as many texels along a side.
+const CUBE: LightProbeDesc = LightProbeDesc {
+    map: ProbeMap::Cube,
+    side: 32,
+    finest: 16,
+};
 
 /// A closed room of bright walls and, last, a mirror in its middle.
 fn scene() -> (Scene, u32) {
@@ -39,7 +50,7 @@ struct Shown {
 }
 
 /// Frames whose maps are drawn from the places that `place` gives.
-fn frames(gpu: &Gpu, refresh: Refresh, count: u64, place: impl Fn(u64) -> Vec3) -> Vec<Shown> {
+fn frames(gpu: &Gpu, map: LightProbeDesc, refresh: Refresh, count: u64, place: impl Fn(u64) -> Vec3) -> Vec<Shown> {
     let (scene, object) = scene();
     let on_device = GpuScene::new(gpu, &scene).unwrap();
     let desc = PreviewDesc {
@@ -47,10 +58,10 @@ fn frames(gpu: &Gpu, refresh: Refresh, count: u64, place: impl Fn(u64) -> Vec3) 
         samples: 1,
         lights: 0,
         shadows: None,
-        has_probes: true,
+        probes: Some(map.map),
     };
     let preview = Preview::new(gpu, &on_device, desc).unwrap();
-    let mut probe = FadingProbe::new(gpu, &on_device, &preview, (DESC, false), refresh).unwrap();
+    let mut probe = FadingProbe::new(gpu, &on_device, &preview, (map, false), refresh).unwrap();
     let surfaces = on_device.surfaces();
     let others = surfaces.before(object);
     let frame = |number: u64| {
@@ -87,7 +98,7 @@ fn frames(gpu: &Gpu, refresh: Refresh, count: u64, place: impl Fn(u64) -> Vec3) 
 /// Values of frames over a map's refresh and its fade.
 pub fn faded_values(gpu: &Gpu) -> Vec<f32> {
     let place = |frame: u64| Vec3::new(if frame < 2 { -0.5 } else { 0.5 }, 0.1, 0.0);
-    let shown = frames(gpu, Refresh { period: 2, fade: 2 }, 4, place);
+    let shown = frames(gpu, DESC, Refresh { period: 2, fade: 2 }, 4, place);
     shown.into_iter().flat_map(|frame| frame.values).collect()
 }
 
@@ -99,18 +110,19 @@ fn difference(a: &[f32], b: &[f32]) -> f32 {
 #[test]
 fn a_scene_at_rest_shows_no_change() {
     with_gpu(|gpu| {
-        for refresh in [
-            Refresh { period: 4, fade: 3 },
-            Refresh { period: 2, fade: 2 },
-            Refresh { period: 3, fade: 1 },
+        for (map, refresh) in [
+            (DESC, Refresh { period: 4, fade: 3 }),
+            (DESC, Refresh { period: 2, fade: 2 }),
+            (DESC, Refresh { period: 3, fade: 1 }),
+            (CUBE, Refresh { period: 4, fade: 3 }),
         ] {
-            let shown = frames(gpu, refresh, 9, |_| Vec3::new(0.1, -0.2, 0.05));
+            let shown = frames(gpu, map, refresh, 9, |_| Vec3::new(0.1, -0.2, 0.05));
             assert!(shown[0].values.iter().any(|value| *value > 0.1));
             for (number, frame) in shown.iter().enumerate() {
                 let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
                 assert!(
                     bits(&frame.values) == bits(&shown[0].values),
-                    "{refresh:?}, frame {number}"
+                    "{map:?}, {refresh:?}, frame {number}"
                 );
             }
         }
@@ -121,46 +133,52 @@ fn a_scene_at_rest_shows_no_change() {
 #[test]
 fn pictures_go_over_in_even_steps() {
     with_gpu(|gpu| {
-        let place = |frame: u64| Vec3::new(if frame < 4 { -0.5 } else { 0.5 }, 0.1, 0.0);
-        let at_once = frames(gpu, Refresh { period: 4, fade: 1 }, 8, place);
-        let faded = frames(gpu, Refresh { period: 4, fade: 3 }, 8, place);
-        let (before, after) = (&at_once[3].values, &at_once[4].values);
-        let jump = difference(before, after);
-        assert!(jump > 0.2, "{jump}");
-        for (number, frame) in faded.iter().enumerate() {
-            let [old, new] = frame.step.weights;
-            assert_eq!(old + new, 1.0);
-            let [old, new] = if number < 4 { [1.0, 0.0] } else { [old, new] };
-            let expected: Vec<f32> = before.iter().zip(after).map(|(a, b)| old * a + new * b).collect();
-            let off = difference(&frame.values, &expected);
-            assert!(off < 2e-6, "frame {number}: {off}");
-            if number > 0 {
-                let step = difference(&frame.values, &faded[number - 1].values);
-                assert!(step < jump / 3.0 + 2e-6, "frame {number}: {step} of {jump}");
-            }
-            let has = |name: &str| frame.passes.iter().any(|pass| pass == name);
-            assert_eq!(
-                has("preview: shade live map"),
-                number % 4 == 0,
-                "{number}: {:?}",
-                frame.passes
-            );
-            // The last of a fade's frames changes places.
-            assert_eq!(
-                has("probe: fade"),
-                [4, 5].contains(&number),
-                "{number}: {:?}",
-                frame.passes
-            );
+        for map in [DESC, CUBE] {
+            goes_over_in_even_steps(gpu, map);
         }
-        // From the end of the fade on it is the new map, to the bit.
-        assert!(faded[6].values == *after && faded[7].values == *after);
-        assert!(
-            !at_once
-                .iter()
-                .any(|frame| frame.passes.iter().any(|pass| pass == "probe: fade"))
-        );
     });
+}
+
+fn goes_over_in_even_steps(gpu: &Gpu, map: LightProbeDesc) {
+    let place = |frame: u64| Vec3::new(if frame < 4 { -0.5 } else { 0.5 }, 0.1, 0.0);
+    let at_once = frames(gpu, map, Refresh { period: 4, fade: 1 }, 8, place);
+    let faded = frames(gpu, map, Refresh { period: 4, fade: 3 }, 8, place);
+    let (before, after) = (&at_once[3].values, &at_once[4].values);
+    let jump = difference(before, after);
+    assert!(jump > 0.2, "{jump}");
+    for (number, frame) in faded.iter().enumerate() {
+        let [old, new] = frame.step.weights;
+        assert_eq!(old + new, 1.0);
+        let [old, new] = if number < 4 { [1.0, 0.0] } else { [old, new] };
+        let expected: Vec<f32> = before.iter().zip(after).map(|(a, b)| old * a + new * b).collect();
+        let off = difference(&frame.values, &expected);
+        assert!(off < 2e-6, "frame {number}: {off}");
+        if number > 0 {
+            let step = difference(&frame.values, &faded[number - 1].values);
+            assert!(step < jump / 3.0 + 2e-6, "frame {number}: {step} of {jump}");
+        }
+        let has = |name: &str| frame.passes.iter().any(|pass| pass == name);
+        assert_eq!(
+            has("preview: shade live map"),
+            number % 4 == 0,
+            "{number}: {:?}",
+            frame.passes
+        );
+        // The last of a fade's frames changes places.
+        assert_eq!(
+            has("probe: fade"),
+            [4, 5].contains(&number),
+            "{number}: {:?}",
+            frame.passes
+        );
+    }
+    // From the end of the fade on it is the new map, to the bit.
+    assert!(faded[6].values == *after && faded[7].values == *after);
+    assert!(
+        !at_once
+            .iter()
+            .any(|frame| frame.passes.iter().any(|pass| pass == "probe: fade"))
+    );
 }
 
 #[test]
@@ -173,7 +191,7 @@ fn refreshes_that_cannot_be_are_refused() {
             samples: 1,
             lights: 0,
             shadows: None,
-            has_probes: true,
+            probes: Some(ProbeMap::Octahedron),
         };
         let preview = Preview::new(gpu, &on_device, desc).unwrap();
         for (period, fade, words) in [

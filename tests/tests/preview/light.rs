@@ -4,7 +4,9 @@ use clerestory::film::Picture;
 use clerestory::gpu::Gpu;
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{Camera, Environment, LightKind, Material, Scene};
-use clerestory::techniques::preview::{LightProbe, LightProbeDesc, Preview, PreviewDesc, PreviewPart, PreviewShadows};
+use clerestory::techniques::preview::{
+    LightProbe, LightProbeDesc, Preview, PreviewDesc, PreviewPart, PreviewShadows, ProbeMap,
+};
 use clerestory::transport::GpuScene;
 use clerestory_hard_cases::scenes::{cuboid, floor};
 use clerestory_tests::render::{builtin, camera_aslant, independent, paths, render};
@@ -15,21 +17,36 @@ use std::f64::consts::PI;
 use crate::subject::sphere;
 
 const SIZE: [u32; 2] = [48, 48];
-const PROBE: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
+pub const PROBE: LightProbeDesc = LightProbeDesc {
+    map: ProbeMap::Octahedron,
+    side: 256,
+    finest: 128,
+};
 
 /// A scene's picture by its first camera and its own lights, lit by a probe of its environment if it has one.
 pub fn picture(gpu: &Gpu, scene: &Scene, samples: u32, shadows: Option<PreviewShadows>) -> Picture {
+    picture_by(gpu, scene, samples, shadows, PROBE)
+}
+
+/// The same by a probe of some map.
+pub fn picture_by(
+    gpu: &Gpu,
+    scene: &Scene,
+    samples: u32,
+    shadows: Option<PreviewShadows>,
+    desc: LightProbeDesc,
+) -> Picture {
     let on_device = GpuScene::new(gpu, scene).unwrap();
     let probe = scene
         .environment
         .as_ref()
-        .map(|environment| LightProbe::of_environment(gpu, PROBE, environment).unwrap());
+        .map(|environment| LightProbe::of_environment(gpu, desc, environment).unwrap());
     let desc = PreviewDesc {
         size: SIZE,
         samples,
         lights: scene.lights.len() as u32,
         shadows,
-        has_probes: probe.is_some(),
+        probes: probe.as_ref().map(|probe| probe.desc().map),
     };
     let mut preview = Preview::new(gpu, &on_device, desc).unwrap();
     let surfaces = on_device.surfaces();
@@ -99,7 +116,7 @@ fn albedos_in_a_uniform_environment_are_the_path_tracers() {
 }
 
 /// A sphere in a scene with an environment that is given by directions, and a parallel view of it along −z.
-fn sphere_under(material: Material, radiance: impl Fn(DVec3) -> Vec3) -> Scene {
+pub fn sphere_under(material: Material, radiance: impl Fn(DVec3) -> Vec3) -> Scene {
     let mut scene = Scene::default();
     let material = scene.add_material(material);
     scene.place(sphere("sphere", material, Vec3::ZERO, 1.0, 96));
@@ -125,7 +142,7 @@ fn sphere_under(material: Material, radiance: impl Fn(DVec3) -> Vec3) -> Scene {
 }
 
 /// The point of the unit sphere at the middle of each pixel of the parallel view; none beside it or close to its outline.
-fn normals() -> Vec<Option<DVec3>> {
+pub fn normals() -> Vec<Option<DVec3>> {
     let [width, height] = SIZE.map(f64::from);
     (0..SIZE[1])
         .flat_map(|y| (0..SIZE[0]).map(move |x| [x, y].map(|i| f64::from(i) + 0.5)))

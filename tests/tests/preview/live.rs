@@ -5,7 +5,9 @@ use clerestory::film::PixelFormat;
 use clerestory::gpu::{BufferDesc, Category, Gpu};
 use clerestory::raster::ShadowLayout;
 use clerestory::scene::{Camera, Material, Mesh, Scene};
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows};
+use clerestory::techniques::preview::{
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows, ProbeMap,
+};
 use clerestory::transport::GpuScene;
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
@@ -75,7 +77,7 @@ pub fn is_at_edge(from: DVec3, direction: DVec3, side: u32) -> bool {
     })
 }
 
-fn live(gpu: &Gpu, subject: &Subject, desc: LightProbeDesc, place: Vec3) -> LiveProbe {
+pub fn live(gpu: &Gpu, subject: &Subject, desc: LightProbeDesc, place: Vec3) -> LiveProbe {
     let scene = &subject.on_device;
     let preview = Preview::new(
         gpu,
@@ -85,7 +87,7 @@ fn live(gpu: &Gpu, subject: &Subject, desc: LightProbeDesc, place: Vec3) -> Live
             samples: 1,
             lights: 0,
             shadows: None,
-            has_probes: false,
+            probes: None,
         },
     )
     .unwrap();
@@ -95,18 +97,21 @@ fn live(gpu: &Gpu, subject: &Subject, desc: LightProbeDesc, place: Vec3) -> Live
         .unwrap();
     let passes = recorder.submit().unwrap().wait().unwrap().passes;
     let names: Vec<_> = passes.iter().map(|pass| pass.name.as_str()).collect();
-    let expected = [
-        "raster: surfaces",
-        "preview: shade live map",
-        "probe: levels and borders",
-        "probe: copy",
-        "probe: filter",
-    ];
+    let drawings = match desc.map {
+        ProbeMap::Octahedron => 1,
+        ProbeMap::Cube => 6,
+    };
+    let mut expected = ["raster: surfaces", "preview: shade live map"].repeat(drawings);
+    expected.extend(["probe: levels and borders", "probe: copy", "probe: filter"]);
     assert_eq!(names, expected);
     live
 }
 
-const DESC: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
+const DESC: LightProbeDesc = LightProbeDesc {
+    map: ProbeMap::Octahedron,
+    side: 256,
+    finest: 128,
+};
 
 /// In whatever direction a surface looks, the probe's last level is its irradiance over π: the rays' mean by the cosine.
 #[test]
@@ -155,7 +160,16 @@ fn reflections_at_the_middle_are_those_of_rays() {
         let place = Vec3::new(0.2, -0.3, 0.1);
         let mut last = f64::INFINITY;
         for side in [64, 128, 256] {
-            let live = live(gpu, &subject, LightProbeDesc { side, finest: 32 }, place);
+            let live = live(
+                gpu,
+                &subject,
+                LightProbeDesc {
+                    map: ProbeMap::Octahedron,
+                    side,
+                    finest: 32,
+                },
+                place,
+            );
             let mut random = Random(5);
             let queries: Vec<Vec4> = (0..4000).map(|_| random.direction().extend(0.0)).collect();
             let found = live.probe().filtered().look_up(&queries).unwrap();
@@ -190,7 +204,11 @@ fn deviations_beside_the_middle_are_parallax() {
         let live = live(
             gpu,
             &subject,
-            LightProbeDesc { side: 256, finest: 32 },
+            LightProbeDesc {
+                map: ProbeMap::Octahedron,
+                side: 256,
+                finest: 32,
+            },
             middle.as_vec3(),
         );
         let mut random = Random(6);
@@ -260,12 +278,16 @@ fn other_previews_and_scenes_are_refused() {
                     width,
                     suns: 0,
                 }),
-                has_probes: false,
+                probes: None,
             };
             Preview::new(gpu, on_device, desc).unwrap()
         };
         let made_for = preview(scene, Some((ShadowLayout::Cube, 1)));
-        let desc = LightProbeDesc { side: 64, finest: 32 };
+        let desc = LightProbeDesc {
+            map: ProbeMap::Octahedron,
+            side: 64,
+            finest: 32,
+        };
         let live = LiveProbe::new(gpu, scene, &made_for, desc, false).unwrap();
         let record = |scene: &GpuScene, preview: &Preview| {
             let mut recorder = gpu.recorder("others").unwrap();
@@ -310,7 +332,7 @@ fn large_pictures_take_several_rows_of_workgroups() {
             samples: 1,
             lights: 0,
             shadows: None,
-            has_probes: false,
+            probes: None,
         };
         let preview = Preview::new(gpu, &scene, desc).unwrap();
         let camera = Camera::look_at("main", DVec3::ZERO, DVec3::X, DVec3::Y, 0.5);

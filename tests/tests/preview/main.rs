@@ -1,6 +1,7 @@
 //! Raster preview: shadow maps against shadow rays, light probes against closed forms and rays, moved objects.
 
 mod bits;
+mod cubes;
 mod fading;
 mod light;
 mod live;

@@ -5,7 +5,7 @@ use clerestory::gpu::Gpu;
 use clerestory::raster::{SHADOW_MAPS_MAX, SHADOW_WIDTH_MAX, ShadowLayout};
 use clerestory::scene::{Camera, LightKind, Material, Scene};
 use clerestory::techniques::preview::{
-    LightProbe, LightProbeDesc, LiveProbe, PARTS_MAX, Preview, PreviewDesc, PreviewPart, PreviewShadows,
+    LightProbe, LightProbeDesc, LiveProbe, PARTS_MAX, Preview, PreviewDesc, PreviewPart, PreviewShadows, ProbeMap,
 };
 use clerestory::transport::GpuScene;
 use clerestory_tests::render::builtin;
@@ -25,7 +25,7 @@ const DESC: PreviewDesc = PreviewDesc {
         width: 1,
         suns: 0,
     }),
-    has_probes: true,
+    probes: Some(ProbeMap::Octahedron),
 };
 
 /// A closed room with a block and, last, a mirror that moves.
@@ -70,7 +70,11 @@ fn frame(
     without: bool,
 ) -> (Vec<u32>, Vec<u32>) {
     let mut preview = Preview::new(gpu, on_device, DESC).unwrap();
-    let desc = LightProbeDesc { side: 64, finest: 32 };
+    let desc = LightProbeDesc {
+        map: ProbeMap::Octahedron,
+        side: 64,
+        finest: 32,
+    };
     let live = LiveProbe::new(gpu, on_device, &preview, desc, false).unwrap();
     let surfaces = on_device.surfaces();
     let others = if without { surfaces.before(moving) } else { surfaces };
@@ -227,15 +231,7 @@ fn mistakes_are_refused() {
                 .record(&mut recorder, &on_device, &surfaces, camera, &many)
                 .is_err()
         );
-        let probeless = Preview::new(
-            gpu,
-            &on_device,
-            PreviewDesc {
-                has_probes: false,
-                ..DESC
-            },
-        )
-        .unwrap();
+        let probeless = Preview::new(gpu, &on_device, PreviewDesc { probes: None, ..DESC }).unwrap();
         let probe = LightProbe::new(gpu, LightProbeDesc::default()).unwrap();
         let lit = PreviewPart {
             probe: Some(&probe),
@@ -259,7 +255,7 @@ fn passes_are_those_that_are_needed() {
         let names = |shadows: Option<PreviewShadows>, lights: &[LightKind]| {
             let desc = PreviewDesc {
                 shadows,
-                has_probes: false,
+                probes: None,
                 ..DESC
             };
             let mut preview = Preview::new(gpu, &on_device, desc).unwrap();

@@ -110,7 +110,7 @@ fn drawn(gpu: &Gpu, scene: &Scene, samples: u32) -> Vec<f32> {
             width: 0,
             suns: 0,
         }),
-        has_probes: false,
+        probes: None,
     };
     let mut preview = Preview::new(gpu, &on_device, desc).unwrap();
     let mirror = PlanarMirror::new(gpu, &on_device, &preview).unwrap();
@@ -186,7 +186,7 @@ fn planes_that_cannot_be_are_refused() {
             samples: 1,
             lights: 1,
             shadows: None,
-            has_probes: false,
+            probes: None,
         };
         let preview = Preview::new(gpu, &on_device, desc).unwrap();
         let mirror = PlanarMirror::new(gpu, &on_device, &preview).unwrap();

@@ -32,7 +32,7 @@ fn preview(gpu: &Gpu, subject: &Subject) -> Preview {
         samples: 1,
         lights: 0,
         shadows: None,
-        has_probes: false,
+        probes: None,
     };
     Preview::new(gpu, &subject.on_device, desc).unwrap()
 }

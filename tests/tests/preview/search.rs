@@ -5,7 +5,7 @@ use clerestory::gpu::Gpu;
 use clerestory::maps::impostor::ImpostorSettings;
 use clerestory::scene::{Camera, Material};
 use clerestory::techniques::preview::{
-    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, SearchedReflections,
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, ProbeMap, SearchedReflections,
 };
 use clerestory::transport::GpuScene;
 use clerestory_tests::with_gpu;
@@ -55,7 +55,7 @@ impl Stage {
             samples: 1,
             lights: 0,
             shadows: None,
-            has_probes: true,
+            probes: Some(ProbeMap::Octahedron),
         };
         Self {
             preview: Preview::new(gpu, &on_device, desc).unwrap(),
@@ -70,7 +70,11 @@ impl Stage {
             true => LiveProbe::with_distances,
             false => LiveProbe::new,
         };
-        let desc = LightProbeDesc { side: SIDE, finest: 32 };
+        let desc = LightProbeDesc {
+            map: ProbeMap::Octahedron,
+            side: SIDE,
+            finest: 32,
+        };
         make(gpu, &self.on_device, &self.preview, desc, false).unwrap()
     }
 
@@ -195,14 +199,14 @@ fn searches_that_cannot_be_are_refused() {
             )
         };
         let without = PreviewDesc {
-            has_probes: false,
+            probes: None,
             ..stage.preview.desc()
         };
         let without = Preview::new(gpu, &stage.on_device, without).unwrap();
         for (preview, live, place, words) in [
             (&stage.preview, &live[0], Vec3::ZERO, "no distances"),
             (&stage.preview, &live[1], Vec3::NAN, "place"),
-            (&without, &live[1], Vec3::ZERO, "has_probes is needed"),
+            (&without, &live[1], Vec3::ZERO, "PreviewDesc::probes is needed"),
         ] {
             let error = refused(preview, live, place).unwrap_err();
             assert!(

@@ -24,6 +24,9 @@ use clerestory::transport::differentials::{
     guard_differentials, normal_derivatives, parallel_beam_differentials, reflect_differentials, refract_differentials,
     rough_reemission, roulette_differentials, transfer_differentials,
 };
+use clerestory::transport::photon_share::{
+    carried_distance2, even_distance2, eye_share, photon_share, placeless_distance2,
+};
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Case, Results, Tolerance, U, compare};
 use clerestory_tests::{twin_kernel, with_gpu};
@@ -659,6 +662,54 @@ fn beams_agree_with_their_twins() {
 }
 
 #[test]
+fn shares_with_eye_paths_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(42, |r| {
+            let corners = [4.0 * r.vector(), 4.0 * r.vector()];
+            list32(
+                &corners,
+                &[
+                    r.magnitude(-6, 6),
+                    r.unit(),
+                    r.magnitude(-4, 6),
+                    r.magnitude(-8, 2),
+                    r.magnitude(0, 24),
+                    code(r.below(2)),
+                    r.choose(&[0.0, 0.01, 1.0, 30.0]),
+                    r.choose(&[0.0, 2.5]),
+                    code(r.below(3)),
+                    r.range(0.0, 5.0),
+                    code(r.below(2)),
+                ],
+            )
+        });
+        let results = twin_photons(gpu, 10, &table, &[]);
+        for (case, result) in table.iter().zip(&results) {
+            let x = case.0.map(f64::from);
+            let is = |i: usize| case.0[i].to_bits() != 0;
+            let even2 = even_distance2(x[6], x[7], x[8], x[9], x[10], is(11));
+            let placeless2 = placeless_distance2(v3(&x, 0), v3(&x, 3));
+            let carried2 = carried_distance2(x[13], case.0[14].to_bits(), x[15], is(16));
+            let twins = [
+                even2,
+                eye_share(x[12], even2),
+                photon_share(x[12], even2),
+                placeless2,
+                carried2,
+            ];
+            for (i, twin) in twins.into_iter().enumerate() {
+                let found = f64::from(result.0[i]);
+                assert!(
+                    (found - twin).abs() <= 32.0 * U * twin,
+                    "{i}: {found} {twin}, {:?}",
+                    case.0
+                );
+            }
+        }
+    });
+}
+
+#[test]
 fn planes_agree_with_their_twins() {
     with_gpu(|gpu| {
         let table = cases(41, |r| {
@@ -732,7 +783,7 @@ fn planes_agree_with_their_twins() {
 #[test]
 fn steps_through_grids_agree_with_their_twins() {
     with_gpu(|gpu| {
-        let table = cases(42, |r| {
+        let table = cases(44, |r| {
             let real: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 0.02, 0.2, 0.7, 1.0]) * r.range(0.9, 1.0));
             let passed: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 0.05, 0.3, 1.0]) * r.range(0.9, 1.0));
             let mut all = real.to_vec();
@@ -740,7 +791,7 @@ fn steps_through_grids_agree_with_their_twins() {
             all.extend([code(r.below(WAY_STEPS as usize)), r.unit(), r.unit()]);
             all
         });
-        let results = twin_photons(gpu, 10, &table, &[]);
+        let results = twin_photons(gpu, 11, &table, &[]);
         let mut steps = 0;
         for (case, result) in table.iter().zip(&results) {
             let x = case.0.map(f64::from);
@@ -772,7 +823,7 @@ fn short_ways_agree_with_their_twins() {
             all.extend(scatters.map(|sigma| sigma.max(0.25) + r.choose(&[0.0, 0.1, 3.0, 100.0])));
             all
         });
-        let results = twin_photons(gpu, 11, &table, &[]);
+        let results = twin_photons(gpu, 12, &table, &[]);
         judge("short beams", &table, &results, ulps(2.0, 2.0, 0.0), 6, |x| {
             short_way_extinction(v3(x, 0), v3(x, 3)).to_array().to_vec()
         });

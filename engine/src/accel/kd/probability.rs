@@ -6,7 +6,7 @@
 //! TBME 30(2), 1983; C. Hoer and C. Love, "Exact Inductance Equations for Rectangular Conductors", J. Res. NBS 69C, 1965 (the integral of
 //! 1/r over two parallel rectangles).
 //!
-//! The exact probability has a closed form, which the thesis does not have (§4.1.1 expects elliptic integrals): a side of the node is seen
+//! The exact probability has a closed form, which Fabianowski does not have (§4.1.1 expects elliptic integrals): a side of the node is seen
 //! from all of the box between its plane and the scene's parallel side, so the solid angle ∫ h/r³ dA is integrated over whole boxes; along
 //! the depth that is 1/r, and over both rectangles it is the function of Hoer and Love. See [`exact`].
 

@@ -11,7 +11,7 @@
 //! - [`ImpostorSettings`]: the method and its steps; [`ImpostorImage::search`] and [`Impostor::search`]: what rays meet, one by one and in batches;
 //! - [`proxy`]: spheres, boxes and a hemisphere in place of distances; [`places`]: which maps serve a point;
 //! - [`views`]: several maps together, blended by what each of them sees;
-//! - [`room`]: rooms with exact answers, which searches are measured by; [`layouts`]: what the layout of texels is measured by.
+//! - [`room`]: rooms with exact answers, which searches are measured by, with the errors of [`published`] searches there; [`layouts`]: what the layout of texels is measured by.
 //!
 //! Guarantees: deterministic, each ray by itself; every number in a result is finite, for rays of any numbers: one whose direction is no unit vector, or that
 //! begins as far as [`ImpostorImage::NOTHING`], finds nothing, and batches refuse it by name. The residual |1 − g| of a result says
@@ -25,6 +25,7 @@
 pub mod layouts;
 pub mod places;
 pub mod proxy;
+pub mod published;
 pub mod room;
 pub mod views;
 

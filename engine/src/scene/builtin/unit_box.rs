@@ -1,7 +1,7 @@
 //! The unit box in which selections of virtual lights were measured: two blocks in a closed grey cube with a square lamp in the ceiling.
 //!
-//! Source: the digest of a doctoral thesis on metals and reflections on graphics hardware, §11.2 (`MET-V1` … `MET-V8`). The ceiling is cut out around
-//! the lamp, so that no two surfaces coincide.
+//! After the chapter on virtual light sources of a doctoral thesis on metals and reflections on graphics hardware (`MET-V1` … `MET-V8`), with
+//! measures of the engine's own. The ceiling is cut out around the lamp, so that no two surfaces coincide.
 
 use glam::{DVec3, Vec3};
 

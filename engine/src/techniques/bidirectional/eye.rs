@@ -152,6 +152,7 @@ impl EyeMemory {
             path_aovs: self.aovs.view(),
             path_receivers: self.aovs.view(),
             path_departures: self.aovs.view(),
+            path_even_distances: self.aovs.view(),
         }
     }
 

@@ -82,7 +82,7 @@ impl MapDrawing {
             let room = LightRoom::of(&scene.lights_without_area());
             let shadows = (!room.is_without_maps()).then(|| shadows_of_side(plan.shadow_side));
             let lights = PreviewLights::new(gpu, &surfaces, room, shadows)?;
-            let shade = Shade::new(gpu, scene, &lights, true, false)?;
+            let shade = Shade::new(gpu, scene, &lights, true, None)?;
             Ok(Shading { lights, shade })
         };
         let shading = is_shaded.then(shading).transpose()?;

@@ -52,7 +52,7 @@ impl PathTracer {
             adaptive: None,
             kept: &self.kept,
             light_tree: self.light_tree.as_ref(),
-            edge_bound: self.edge_bound,
+            others: self.others,
             arrival,
             under_way: UnderWay::Full {
                 refill: &full.refill,

@@ -12,6 +12,8 @@ pub(super) struct KeptBySlot {
     receivers: Option<Buffer>,
     /// Under which cosine they left there, where edges are bounded by their geometry term.
     departures: Option<Buffer>,
+    /// By what they share light with photons, where they do.
+    even_distances: Option<Buffer>,
     /// What an arrival stage keeps by place.
     stage: Option<Buffer>,
 }
@@ -22,6 +24,7 @@ pub(super) struct KeptNeeds {
     pub aovs: bool,
     pub receivers: bool,
     pub departures: bool,
+    pub even_distances: bool,
     /// Of an arrival stage, by place.
     pub stage_bytes: u64,
 }
@@ -34,6 +37,7 @@ impl KeptBySlot {
         };
         let receivers = || work("path receivers", size_of::<LightReceiver>(), slots);
         let departures = || work("path departures", size_of::<f32>(), slots);
+        let even_distances = || work("path even distances", size_of::<f32>(), slots);
         let stage = || {
             let bytes = has.stage_bytes * u64::from(slots);
             gpu.buffer(&BufferDesc::storage("arrival stage", bytes, Category::Work))
@@ -42,16 +46,18 @@ impl KeptBySlot {
             aovs: work("path aovs", size_of::<PathAov>(), if has.aovs { slots } else { 0 })?,
             receivers: has.receivers.then(receivers).transpose()?,
             departures: has.departures.then(departures).transpose()?,
+            even_distances: has.even_distances.then(even_distances).transpose()?,
             stage: (has.stage_bytes > 0).then(stage).transpose()?,
         })
     }
 
-    /// Set 1. Without receivers or departures another buffer stands in their place.
+    /// Set 1. Another buffer stands in the place of what there is not.
     pub fn set(&self) -> PathSlotSet<'_> {
         PathSlotSet {
             path_aovs: self.aovs.view(),
             path_receivers: self.receivers.as_ref().unwrap_or(&self.aovs).view(),
             path_departures: self.departures().view(),
+            path_even_distances: self.even_distances.as_ref().unwrap_or(&self.aovs).view(),
         }
     }
 

@@ -18,6 +18,7 @@ mod directions;
 mod full;
 mod in_order;
 mod kept;
+mod others;
 mod pipelines;
 mod record;
 mod refill;
@@ -30,6 +31,7 @@ use std::sync::Arc;
 use self::adaptive::AdaptiveSamples;
 pub(super) use self::card::CARD;
 use self::kept::{KeptBySlot, KeptNeeds};
+use self::others::OtherMeans;
 use self::pipelines::{CameraStage, Pipelines};
 use self::record::{EyeStages, ResolveTarget, UnderWay, record_resolve};
 use self::refill::{FullWave, ResultMemory, slot_numbers};
@@ -112,8 +114,7 @@ pub struct PathTracer {
     gpu: Gpu,
     scene: Arc<GpuScene>,
     settings: PathTracerSettings,
-    /// Up to which other means have the light of edges between two scatterings.
-    edge_bound: EdgeBound,
+    others: OtherMeans,
     frame: CameraFrame,
     /// Where the camera is, for the medium around it.
     eye: DVec3,
@@ -170,6 +171,43 @@ impl PathTracer {
         edge_bound: EdgeBound,
         stage_bytes: u64,
     ) -> Result<Self> {
+        let others = OtherMeans {
+            edge_bound,
+            ..OtherMeans::default()
+        };
+        Self::beside(gpu, scene, camera, size, settings, others, stage_bytes)
+    }
+
+    /// As [`PathTracer::new`], for pictures in which so many photons of a pass share what paths scatter behind their first scattering in a medium
+    /// ([`photon_share`](crate::transport::photon_share)), but its direct light: paths have what these leave. 0: all that their path set has. Waves are whole.
+    pub(crate) fn beside_photons(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: PathTracerSettings,
+        photons: u32,
+    ) -> Result<Self> {
+        debug_assert!(
+            photons == 0 || !settings.keeps_waves_full(),
+            "paths of whole waves begin together"
+        );
+        let others = OtherMeans {
+            photons,
+            ..OtherMeans::default()
+        };
+        Self::beside(gpu, scene, camera, size, settings, others, 0)
+    }
+
+    fn beside(
+        gpu: &Gpu,
+        scene: Arc<GpuScene>,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: PathTracerSettings,
+        others: OtherMeans,
+        stage_bytes: u64,
+    ) -> Result<Self> {
         settings.check()?;
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
         let full_wave = settings.keeps_waves_full();
@@ -189,7 +227,7 @@ impl PathTracer {
         } else {
             None
         };
-        let pipelines = Pipelines::new(gpu, &scene, &settings, light_tree.is_some(), edge_bound, &frame, camera)?;
+        let pipelines = Pipelines::new(gpu, &scene, &settings, light_tree.is_some(), others, &frame, camera)?;
         let has_media = scene.profile().media.any();
         let needs = WaveNeeds {
             waiting: scene.has_lights(),
@@ -202,11 +240,12 @@ impl PathTracer {
         let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
         let adaptive = settings.adaptive != Adaptive::Off;
         let more = |slots| {
-            let has_departures = matches!(edge_bound, EdgeBound::Geometry(_));
+            let has_departures = matches!(others.edge_bound, EdgeBound::Geometry(_));
             let has = KeptNeeds {
                 aovs: film.has_aovs(),
                 receivers: light_tree.is_some(),
                 departures: has_departures,
+                even_distances: others.photons > 0,
                 stage_bytes,
             };
             let kept = KeptBySlot::new(gpu, slots, has)?;
@@ -251,7 +290,7 @@ impl PathTracer {
             gpu: gpu.clone(),
             scene,
             settings,
-            edge_bound,
+            others,
             frame,
             eye: camera.transform.translation,
             pipelines,
@@ -416,6 +455,11 @@ impl PathTracer {
         self.kept.departures().clone()
     }
 
+    /// Within which photons are seen that share light with the paths, m: for waves that have not begun.
+    pub(crate) fn see_photons_within(&mut self, radius: f64) {
+        self.others.photon_radius = radius as f32;
+    }
+
     /// What an arrival stage keeps by place, of as many bytes as were asked for.
     pub(crate) fn stage_memory(&self) -> Buffer {
         self.kept.stage().clone()
@@ -490,7 +534,7 @@ impl PathTracer {
             adaptive: self.adaptive.as_ref(),
             kept: &self.kept,
             light_tree: self.light_tree.as_ref(),
-            edge_bound: self.edge_bound,
+            others: self.others,
             arrival,
             under_way: UnderWay::Whole {
                 wave: *wave,

@@ -1,13 +1,13 @@
 //! The path tracer's own kernels, specialized to what a scene needs.
 
 use super::directions::DirectionsStage;
+use super::others::OtherMeans;
 use super::settings::PathTracerSettings;
 use crate::Result;
 use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_refill, path_resolve, path_shade};
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
 use crate::scene::Camera;
 use crate::scene::camera_frame::CameraFrame;
-use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, surface_spec};
 
 /// One kernel a stage of its own.
@@ -70,7 +70,7 @@ impl Pipelines {
         scene: &GpuScene,
         settings: &PathTracerSettings,
         has_light_tree: bool,
-        edge_bound: EdgeBound,
+        others: OtherMeans,
         frame: &CameraFrame,
         camera: &Camera,
     ) -> Result<Self> {
@@ -91,7 +91,8 @@ impl Pipelines {
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
             count_fetches: settings.count_fetches,
-            edge_bound: edge_bound.kind(),
+            edge_bound: others.edge_bound.kind(),
+            sharing_photons: others.photons,
         });
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.
@@ -110,6 +111,7 @@ impl Pipelines {
             sampler_kind: shade.sampler_kind,
             has_path_automaton: shade.has_path_automaton,
             numbered: shade.numbered,
+            sharing_photons: shade.sharing_photons,
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             has_airlight: settings.equiangular && scene.airlight_helps(),

@@ -3,6 +3,7 @@
 use super::adaptive::AdaptiveSamples;
 use super::in_order::{Piece, SamplesInOrder};
 use super::kept::KeptBySlot;
+use super::others::OtherMeans;
 use super::pipelines::{CameraStage, Pipelines};
 use super::refill::RefillStage;
 use super::settings::PathTracerSettings;
@@ -16,7 +17,6 @@ use crate::gpu::shaders::types::CameraView;
 use crate::gpu::{Access, ComputePipeline, Pass, Recorder, TexelView};
 use crate::scene::camera_frame::CameraFrame;
 use crate::transport::GpuScene;
-use crate::transport::edge_bound::EdgeBound;
 use crate::walk::{ArrivalStage, Bounce, Refill, WalkKey, WalkStages, WaveBuffers, stage_barrier};
 use glam::DVec3;
 
@@ -31,7 +31,7 @@ pub(super) struct EyeStages<'a> {
     pub adaptive: Option<&'a AdaptiveSamples>,
     pub kept: &'a KeptBySlot,
     pub light_tree: Option<&'a TexelView>,
-    pub edge_bound: EdgeBound,
+    pub others: OtherMeans,
     pub arrival: Option<&'a dyn ArrivalStage>,
     pub under_way: UnderWay<'a>,
 }
@@ -91,7 +91,8 @@ impl EyeStages<'_> {
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             accepting: settings.path_set.accepting(),
             successors: settings.path_set.successors(),
-            edge_bound: self.edge_bound.value(),
+            edge_bound: self.others.edge_bound.value(),
+            photon_radius: self.others.photon_radius,
         }
     }
 }

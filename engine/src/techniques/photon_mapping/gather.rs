@@ -1,26 +1,27 @@
 //! Queries of the photon map where eye paths have arrived: a stage of the path tracer's bounces.
 
+mod counts;
+mod linear;
+mod stage;
+
+pub use counts::{GatherCounts, RayFetches};
+
 use std::sync::OnceLock;
 
+use self::stage::GatherStage;
 use super::map::PhotonMap;
 use super::path_classes::{ASKING_STATES, PathClasses};
-use super::queue::{AskSpec, Queue};
+use super::queue::{AskSpec, Queue, QueueMemory};
 use super::settings::{MapQuery, PhotonSettings};
-use super::volume::{Beam, BeamAsk, BeamStage, EventMap, SWEEPS_MAX};
+use super::volume::{Beam, BeamAsk, BeamStage, EventMap};
 use crate::catalogue::{Bias, Role, Row, sources};
-use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
-    LOBE_DIFFUSE, LOBE_REFLECTION, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS, PATH_SET_DEAD, PATH_SET_STATE_BITS,
-    QUEUE_SLOTS, WALK_GROUP,
+    LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR, NEAREST_BINS, NEAREST_HALVINGS, NEAREST_ROUNDS,
+    PATH_SET_DEAD, PATH_SET_LOBE_COUNT, PATH_SET_STATE_BITS, QUEUE_SLOTS,
 };
-use crate::gpu::shaders::sets::{PhotonMapSet, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
-use crate::gpu::shaders::types::AskSettings;
-use crate::gpu::{
-    Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, SOFTWARE_LOOP_CAP, wide_counter,
-};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, SOFTWARE_LOOP_CAP, wide_counter};
 use crate::transport::{GpuScene, PathSet, surface_spec};
-use crate::walk::{ArrivalStage, Places, StoppedPlaces, stage_barrier};
 use crate::{Error, Result};
 
 /// Nodes and records of each of the rounds in which neighbours are found, and of the sum. With the loops over rounds and bins, which are
@@ -28,52 +29,6 @@ use crate::{Error, Result};
 const NEAREST_QUOTA: u32 = (SOFTWARE_LOOP_CAP - NEAREST_SEARCHES * (1 + 2 * NEAREST_BINS)) / (NEAREST_SEARCHES + 1);
 /// Searches for the last neighbour, at most.
 const NEAREST_SEARCHES: u32 = NEAREST_ROUNDS + NEAREST_HALVINGS;
-
-/// Records that a submission takes at all of its places, where no hierarchy helps: a fraction of a second on devices that a driver watches.
-const LINEAR_RECORDS: u64 = 1 << 28;
-
-/// Exact counts of queries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
-#[non_exhaustive]
-pub struct GatherCounts {
-    /// Points at which the map was asked.
-    pub queries: u64,
-    /// Kernels that held them.
-    pub photons: u64,
-    /// Rays that told whether what was found is seen: of photon planes alone.
-    pub rays: u64,
-}
-
-impl std::ops::AddAssign for GatherCounts {
-    fn add_assign(&mut self, other: Self) {
-        self.queries += other.queries;
-        self.photons += other.photons;
-        self.rays += other.rays;
-    }
-}
-
-/// What rays through media took of the volume map, where that is counted ([`PhotonSettings::count_fetches`]): exact counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
-#[non_exhaustive]
-pub struct RayFetches {
-    /// Queries of rays after the first one of a path, which may be one that has only crossed a boundary.
-    pub later_queries: u64,
-    /// Nodes of the map that were fetched, two at a time, once for all rays of a subgroup that go through it together.
-    pub nodes: u64,
-    /// Records, likewise.
-    pub records: u64,
-    /// Pairs of nodes, and records, that each ray has gone through.
-    pub tests: u64,
-}
-
-impl std::ops::AddAssign for RayFetches {
-    fn add_assign(&mut self, other: Self) {
-        self.later_queries += other.later_queries;
-        self.nodes += other.nodes;
-        self.records += other.records;
-        self.tests += other.tests;
-    }
-}
 
 /// Each point by itself, or those of a subgroup together.
 enum Query {
@@ -112,19 +67,6 @@ pub(super) struct Gather {
     beam: Option<Beam>,
 }
 
-/// Queries of one map, to be recorded with a wave.
-pub(super) struct GatherStage<'a> {
-    gather: &'a Gather,
-    scene: &'a GpuScene,
-    map: &'a PhotonMap,
-    /// Of stored fluxes, in W a photon.
-    scale: f32,
-    neighbors: u32,
-    radius: f32,
-    /// Of the volume map, in scenes with media.
-    beam: Option<BeamStage<'a>>,
-}
-
 /// A map of media, as its queries need it.
 pub(super) struct EventsAsked<'a> {
     pub map: &'a EventMap,
@@ -154,7 +96,8 @@ impl Gather {
             counts_bounces: set.min_bounces() > least || set.max_bounces().is_some(),
             of_rays: false,
         };
-        let queue = Queue::new(gpu, scene, settings.queue, ask, slots)?;
+        let queues = QueueMemory::new(gpu, settings.queue, slots)?;
+        let queue = Queue::new(gpu, scene, &queues, ask)?;
         let nearest = settings.neighbors > 0;
         let has_media = scene.profile().media.any();
         // Both entry points have the same constants.
@@ -196,18 +139,25 @@ impl Gather {
         } else {
             Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
         };
+        // Eye paths that go on in a medium ask no more.
+        let floor = match settings.volume_paths && has_media {
+            true => states_before_rough(eye),
+            false => u32::MAX,
+        };
         let (gather_states, caustic_states) = match classes {
             Some(classes) => (classes.asking()[0], 0),
             None => gathering_states(settings, eye),
         };
+        let gather_states = gather_states & floor;
         let asking = BeamAsk {
             eye,
             classes,
             surface_states: gather_states,
             counts_bounces: ask.counts_bounces,
+            floor,
         };
         let beam = has_media
-            .then(|| Beam::new(gpu, scene, settings, asking, slots))
+            .then(|| Beam::new(gpu, scene, settings, asking, &queues, slots))
             .transpose()?;
         let bytes = size_of::<Counters>() as u64;
         let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;
@@ -287,229 +237,6 @@ impl Gather {
     }
 }
 
-impl GatherStage<'_> {
-    fn ask(&self) -> AskSettings {
-        let [lower, upper] = self.scene.bounds();
-        AskSettings {
-            scene_lower: lower.to_array(),
-            states: self.gather.gather_states,
-            scene_upper: upper.to_array(),
-            most_bounces: self.gather.bounces[1],
-        }
-    }
-
-    /// Of queries; those that go through records say besides which ones, and of which places.
-    fn push(&self) -> photon_gather::Push {
-        photon_gather::Push {
-            ask: self.ask(),
-            caustic_states: self.gather.caustic_states,
-            least_bounces: self.gather.bounces[0],
-            scale: self.scale,
-            neighbors: self.neighbors,
-            radius: self.radius,
-            classes: self.gather.classes,
-            ..Default::default()
-        }
-    }
-
-    fn set(&self) -> PhotonMapSet<'_> {
-        PhotonMapSet {
-            photon_pairs: &self.map.pairs,
-            photon_map_records: &self.map.records,
-            gather_counters: self.gather.counters.view(),
-            photon_map_root: self.map.root.view(),
-            photon_beam_ways: self
-                .gather
-                .beam
-                .as_ref()
-                .map_or(self.gather.counters.view(), Beam::ways),
-        }
-    }
-}
-
-impl ArrivalStage for GatherStage<'_> {
-    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
-        let gather = self.gather;
-        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
-        if let Some(beam) = &self.beam {
-            beam.record(recorder, self.scene, wave, places)?;
-        }
-        if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
-            recorder.pass("photon: plane rays", |pass| {
-                planes.record(pass, self.scene, wave, places)
-            })?;
-        }
-        let mut groups = places.items;
-        if gather.queue.collects() {
-            recorder.pass("photon: gather queue", |pass| {
-                groups = gather
-                    .queue
-                    .record(pass, self.scene, wave, places, self.ask(), &queue)?;
-                Ok(())
-            })?;
-        }
-        recorder.pass("photon: gather", |pass| {
-            let (sets, push): ([&dyn BindingSet<'_>; 4], _) = ([wave, &scene, &queue, &map], self.push());
-            match &gather.query {
-                Query::Single(kernel) => pass.dispatch_indirect(kernel, &sets, &push, groups)?,
-                Query::Packet(kernel) => pass.dispatch_indirect(kernel, &sets, &bytemuck::cast(push), groups)?,
-            }
-            stage_barrier(pass);
-            Ok(())
-        })
-    }
-
-    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
-        self.beam.as_ref().map_or(Ok(()), |beam| beam.reset(pass))?;
-        pass.update(self.gather.counters.view(), &[Counters::default()])
-    }
-
-    fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
-        self.beam.as_ref().map_or(Ok(()), |beam| beam.read_back(pass))?;
-        pass.copy(self.gather.counters.view(), self.gather.counters_readback.view())
-    }
-
-    fn prepare_stopped(&self) -> Result<()> {
-        self.beam.as_ref().map_or(Ok(()), BeamStage::prepare_stopped)?;
-        if let Linear::Records(spec, made) = &self.gather.linear
-            && made.get().is_none()
-        {
-            let linear = self.gather.gpu.compute_pipeline(spec.as_ref())?;
-            made.get_or_init(|| linear);
-        }
-        Ok(())
-    }
-
-    fn record_stopped(
-        &self,
-        recorder: &mut Recorder,
-        wave: &WaveSet<'_>,
-        stopped: StoppedPlaces,
-        part: u64,
-    ) -> Result<Option<u64>> {
-        let gather = self.gather;
-        // Those of beams come first.
-        let beams = self
-            .beam
-            .as_ref()
-            .map(|beam| (beam, LinearParts::new(gather.quota, beam.map.count, stopped)));
-        let of_beams = beams.as_ref().map_or(0, |(_, parts)| parts.count());
-        if let Some((beam, parts)) = beams.filter(|_| part < of_beams) {
-            let (mut part, mut taken) = (part, 0);
-            recorder.pass("photon: beams all", |pass| {
-                while part < of_beams && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {
-                    let places = [parts.first_place(part), parts.places];
-                    beam.record_linear(pass, self.scene, wave, stopped.key, places, parts.records(part))?;
-                    taken += parts.cost();
-                    part += 1;
-                }
-                Ok(())
-            })?;
-            return Ok(Some(part));
-        }
-        let mut first_part = of_beams;
-        if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
-            // However many sweeps there are, what comes behind has the same number.
-            first_part = of_beams + SWEEPS_MAX + 2;
-            let sweep = part - of_beams;
-            if part < first_part && (sweep == 0 || planes.remain()?) {
-                recorder.pass("photon: plane rays all", |pass| {
-                    planes.record_sweep(pass, self.scene, wave, stopped, sweep)
-                })?;
-                return Ok(Some(part + 1));
-            }
-        }
-        if gather.counters_readback.read::<Counters>(0, 1)?[0].stopped == 0 {
-            // Beams alone have stopped.
-            return Ok(None);
-        }
-        let Linear::Records(_, made) = &gather.linear else {
-            return Err(Error::Overflow {
-                kernel: "photon_gather".into(),
-                what: "steps of a query for neighbours".into(),
-                needed: u64::from(NEAREST_QUOTA) + 1,
-                capacity: u64::from(NEAREST_QUOTA),
-                instead: "look for neighbours within a smaller radius, trace fewer photons per pass, or ask point by point (\"query\": \"single\")"
-                    .into(),
-            });
-        };
-        let linear = made.get().ok_or_else(|| Error::Internal {
-            what: "photon map".into(),
-            fault: "has stopped queries without the kernel for them".into(),
-        })?;
-        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
-        let parts = LinearParts::new(gather.quota, self.map.count, stopped);
-        let (mut part, mut taken) = (part.saturating_sub(first_part), 0);
-        recorder.pass("photon: gather all", |pass| {
-            while part < parts.count() && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {
-                let [first, last] = parts.records(part);
-                let push = photon_gather::Push {
-                    first_place: parts.first_place(part),
-                    first,
-                    last,
-                    ..self.push()
-                };
-                let groups = linear.groups_for(parts.places);
-                pass.dispatch(linear, &[wave, &scene, &queue, &map], &push, [groups, 1, 1])?;
-                stage_barrier(pass);
-                taken += parts.cost();
-                part += 1;
-            }
-            Ok(())
-        })?;
-        Ok((part < parts.count()).then_some(first_part + part))
-    }
-}
-
-/// How a pass through all records is cut: some records at a time, which says in what order sums are formed, each of them for some places at a
-/// time, which nothing depends on.
-#[derive(Debug, Clone, Copy)]
-struct LinearParts {
-    quota: u32,
-    count: u32,
-    stopped: StoppedPlaces,
-    /// Places of a part: whole workgroups.
-    places: u32,
-}
-
-impl LinearParts {
-    /// Of `count` records, `quota` at a time.
-    fn new(quota: u32, count: u32, stopped: StoppedPlaces) -> Self {
-        let most = (LINEAR_RECORDS / u64::from(quota)).min(u64::from(u32::MAX / 2)) as u32;
-        let places = if stopped.stopped <= most { stopped.places } else { most };
-        Self {
-            quota,
-            count,
-            stopped,
-            places: places.max(1).next_multiple_of(WALK_GROUP),
-        }
-    }
-
-    /// Parts for the same records.
-    fn ranges(&self) -> u64 {
-        u64::from(self.stopped.places.div_ceil(self.places))
-    }
-
-    fn count(&self) -> u64 {
-        self.ranges() * u64::from(self.count.div_ceil(self.quota))
-    }
-
-    /// Records that a part takes, at most.
-    fn cost(&self) -> u64 {
-        u64::from(self.quota) * u64::from(self.stopped.stopped.min(self.places))
-    }
-
-    fn first_place(&self, part: u64) -> u32 {
-        (part % self.ranges()) as u32 * self.places
-    }
-
-    /// The first record and the one past the last.
-    fn records(&self, part: u64) -> [u32; 2] {
-        let first = (part / self.ranges()) as u32 * self.quota;
-        [first, first.saturating_add(self.quota).min(self.count)]
-    }
-}
-
 /// The states of eye paths whose diffuse surfaces ask the map, and those that ask it for caustics alone, a bit each.
 ///
 /// A path whose next diffuse scattering leads to direct light at most asks at that surface for all the rest. With a final gather the first
@@ -534,6 +261,30 @@ fn gathering_states(settings: &PhotonSettings, eye: &PathSet) -> (u32, u32) {
         caustic |= u32::from(settings.final_gather && asks && goes_on) << state;
     }
     (gathering, caustic)
+}
+
+/// The states of eye paths that specular and glossy scattering alone leads to, a bit each.
+fn states_before_rough(eye: &PathSet) -> u32 {
+    let successors = eye.successors();
+    let mut reached = 1u32;
+    loop {
+        let before = reached;
+        for (state, word) in successors
+            .iter()
+            .enumerate()
+            .filter(|(state, _)| before >> state & 1 != 0)
+        {
+            for symbol in 0..PATH_SET_LOBE_COUNT {
+                let after = word >> (PATH_SET_STATE_BITS * symbol) & PATH_SET_DEAD;
+                if 1 << symbol & (LOBE_SPECULAR | LOBE_GLOSSY) != 0 && after != PATH_SET_DEAD {
+                    reached |= 1 << after;
+                }
+            }
+        }
+        if reached == before {
+            return reached;
+        }
+    }
 }
 
 /// Rows of the catalogue.
@@ -677,40 +428,3 @@ pub(crate) const ROWS: &[Row] = &[
         ..Row::of(file!())
     },
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::walk::WalkKey;
-
-    #[test]
-    fn linear_parts_take_every_record_at_every_place_once_in_order() {
-        for (quota, count, places, stopped) in [
-            (1, 5, 1, 1),
-            (64, 6000, 256, 3),
-            (32_768, 40_000, 100_000, 100_000),
-            (32_768, 1 << 16, 100_000, 7),
-            (32_768, 32_768, 8192, 8192),
-            (3, 10, 65, 65),
-        ] {
-            let key = WalkKey::default();
-            let parts = LinearParts::new(quota, count, StoppedPlaces { places, stopped, key });
-            // Records that the places of each range have gone through.
-            let mut done = std::collections::BTreeMap::new();
-            for part in 0..parts.count() {
-                let [first, last] = parts.records(part);
-                assert!(last > first && last - first <= quota, "{parts:?}");
-                let before = done.insert(parts.first_place(part), last);
-                assert_eq!(before.unwrap_or(0), first, "{parts:?}");
-            }
-            assert!(done.values().all(|last| *last == count), "{parts:?}");
-            let firsts: Vec<u32> = done.into_keys().collect();
-            let expected: Vec<u32> = (0..places).step_by(parts.places as usize).collect();
-            assert_eq!(firsts, expected, "{parts:?}");
-            assert!(
-                parts.places.is_multiple_of(WALK_GROUP) && parts.cost() <= LINEAR_RECORDS,
-                "{parts:?}"
-            );
-        }
-    }
-}

@@ -77,7 +77,7 @@ impl GlowStage {
         self.share
     }
 
-    /// Puts the photons of media that emit in their slots.
+    /// Puts the photons of media that emit in their slots, which carry `placeless2` (`PhotonPlan::tells_lights`).
     pub fn record(
         &self,
         pass: &mut Pass<'_>,
@@ -85,6 +85,7 @@ impl GlowStage {
         scene: &GpuScene,
         differentials: &Buffer,
         key: WalkKey,
+        placeless2: f32,
     ) -> Result<()> {
         let [sources, bodies] = self.counts;
         let push = photon_glow::Push {
@@ -94,6 +95,7 @@ impl GlowStage {
             bodies,
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             outside: OUTSIDE,
+            placeless2,
         };
         let set = photon_glow::Set1 {
             glow_sources: self.sources.view(),

@@ -7,8 +7,9 @@
 //!
 //! Light paths are parted without overlap: what the eye sees through specular and glossy scattering alone, and the light that arrives
 //! directly where it first sees a diffuse surface or a medium scatters it, are the path tracer's; everything else that arrives there is the maps', one of
-//! surfaces and one of media. Glossy lobes are never estimated from the map. Three kinds of light are the eye paths' alone, so that what they give beyond the first diffuse reflection
-//! is missing: unlit surfaces, emitters behind others with alpha in the same place, and slivers that light sampling leaves out. A photon
+//! surfaces and one of media. Where eye paths go on in media ([`PhotonSettings::volume_paths`]) they share what they find there with the map of media
+//! ([`photon_share`](crate::transport::photon_share)): all light that is seen first by a scattering in a medium, but that which a mirror scatters first, as caustics. Glossy lobes are never estimated from the map. Three kinds of light are the eye paths' alone, so that what they give beyond the first diffuse reflection
+//! is missing (unless eye paths go on in a medium): unlit surfaces, emitters behind others with alpha in the same place, and slivers that light sampling leaves out. A photon
 //! that starts inside a solid knows it from where it first meets the inside of one.
 //!
 //! Guarantees: deterministic in (seed, pass, photon) and (seed, pixel, sample), on any number of threads; scaling a scene, with lengths among
@@ -165,7 +166,10 @@ impl PhotonMapper {
             let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\", \"unified\" or \"march\"";
             return Err(Error::setting("volume", settings.volume.word(), cause));
         }
-        let (classes, eye_paths) = (settings.classes()?, settings.eye_paths(has_media)?);
+        let has_map = settings.needs_photons() && sends_photons(&scene);
+        // Whether eye paths go on in media, for a share of the photons' light.
+        let shares = settings.volume_paths && has_media && has_map;
+        let (classes, eye_paths) = (settings.classes(shares)?, settings.eye_paths(has_media, shares)?);
         let eye_settings = PathTracerSettings {
             path_set: eye_paths,
             sampler: settings.sampler,
@@ -177,7 +181,6 @@ impl PhotonMapper {
             paths_in_flight: paths_in_flight(gpu, &scene),
             ..PathTracerSettings::default()
         };
-        let has_map = settings.needs_photons() && sends_photons(&scene);
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
             let (plan, stored) = (settings.plan(has_media), (settings.volume, settings.volume_beams));
@@ -185,7 +188,8 @@ impl PhotonMapper {
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
-        let eye = PathTracer::new(gpu, Arc::clone(&scene), camera, size, eye_settings)?;
+        let photons_beside = if shares { settings.photons } else { 0 };
+        let eye = PathTracer::beside_photons(gpu, Arc::clone(&scene), camera, size, eye_settings, photons_beside)?;
         let photons = match tracer {
             Some(tracer) => Some(Photons {
                 tracer,
@@ -382,6 +386,7 @@ impl PhotonMapper {
             _ => None,
         };
         let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
+        self.eye.see_photons_within(event_kernel.length_max);
         let step = self.eye.step_with(end, arrival)?;
         if let Some(photons) = &mut self.photons {
             // They are those of a whole wave.

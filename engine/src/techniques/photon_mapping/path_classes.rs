@@ -6,7 +6,8 @@
 //! the light on.
 //!
 //! Eye paths have an automaton of two floors: one of specular and glossy scattering, on which the maps are asked, and one behind a diffuse scattering or one in a medium, where
-//! they gather direct light alone. States of the first floor are numbered as those of the path set that they stand for are met.
+//! they gather direct light alone. Or they go on behind one in a medium, and share what they find there with the map: then what they find is all but light that a mirror scatters first, for which
+//! a state also says whether the last scattering was by one. States of the first floor are numbered as those of the path set that they stand for are met.
 
 use crate::gpu::shaders::constants::{
     ASKING_STATES as ASKING, CLASSES_IN_MEDIA_SHIFT, CLASSES_ON_SURFACES, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
@@ -36,11 +37,11 @@ pub(super) struct PathClasses {
 }
 
 impl PathClasses {
-    /// Parts a set without a range of bounces; the maps have direct light, too, where `direct` says so.
+    /// Parts a set without a range of bounces; the maps have direct light, too, where `direct` says so, and eye paths that go on in media share it where `shares` does.
     ///
     /// # Errors
     /// What there is too much of.
-    pub fn new(set: &PathSet, direct: bool) -> Result<Self, &'static str> {
+    pub fn new(set: &PathSet, direct: bool, shares: bool) -> Result<Self, &'static str> {
         let after = |state: u32, lobe: u32| {
             set.successors()[state as usize] >> (PATH_SET_STATE_BITS * lobe.trailing_zeros()) & PATH_SET_DEAD
         };
@@ -75,7 +76,7 @@ impl PathClasses {
             }
             class += 1;
         }
-        let (eye, asking) = eye_states(set, direct)?;
+        let (eye, asking) = eye_states(set, direct, shares)?;
         let counting = |state: u32, lobe: u32| match after(state, lobe) {
             PATH_SET_DEAD => 0,
             after => (0..classes.len()).fold(0u32, |bits, class| bits | (classes[class] >> after & 1) << class),
@@ -107,8 +108,40 @@ impl PathClasses {
     }
 }
 
+/// Behind the first floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Behind {
+    /// Of the path set.
+    state: u32,
+    /// Light counts where the path set has it.
+    counts: bool,
+    /// The path may be scattered further.
+    goes_on: bool,
+}
+
+/// States behind a scattering in a medium from which light counts sooner or later where paths go on: of the path set, and whether it counts there.
+fn fruitful(set: &PathSet, after: impl Fn(u32, u32) -> u32) -> impl Fn(u32, bool) -> bool {
+    let accepts = |state: u32| set.accepting() >> state & 1 != 0;
+    let mut fruitful = [[false; 2]; STATES];
+    loop {
+        let before = fruitful;
+        for state in 0..PATH_SET_STATES {
+            let leads = |symbol: u32| {
+                let lobe = 1u32 << symbol;
+                let to = after(state, lobe);
+                to != PATH_SET_DEAD && before[to as usize][usize::from(lobe & LOBE_SPECULAR == 0)]
+            };
+            let goes_on = (0..PATH_SET_LOBE_COUNT).any(leads);
+            fruitful[state as usize] = [goes_on, goes_on || accepts(state)];
+        }
+        if fruitful == before {
+            return move |state: u32, counts: bool| fruitful[state as usize][usize::from(counts)];
+        }
+    }
+}
+
 /// The automaton of eye paths, and the states of the path set that its asking states stand for.
-fn eye_states(set: &PathSet, direct: bool) -> Result<(PathSet, Vec<u32>), &'static str> {
+fn eye_states(set: &PathSet, direct: bool, shares: bool) -> Result<(PathSet, Vec<u32>), &'static str> {
     let on_first_floor = |lobe: u32| lobe & (LOBE_SPECULAR | LOBE_GLOSSY) != 0;
     let after = |state: u32, lobe: u32| {
         set.successors()[state as usize] >> (PATH_SET_STATE_BITS * lobe.trailing_zeros()) & PATH_SET_DEAD
@@ -131,25 +164,57 @@ fn eye_states(set: &PathSet, direct: bool) -> Result<(PathSet, Vec<u32>), &'stat
     if first.len() > ASKING_STATES {
         return Err("tells more of what comes before the maps apart than queries can");
     }
-    let mut second: Vec<u32> = Vec::new();
+    let fruitful = fruitful(set, after);
+    // Where a path is after a scattering that leads off the first floor, or one behind it; `None` where no light counts any more.
+    let behind = |from: Option<Behind>, to: u32, lobe: u32| {
+        let next = match from {
+            None if shares && lobe == LOBE_VOLUME => Behind {
+                state: to,
+                counts: !direct,
+                goes_on: true,
+            },
+            None => Behind {
+                state: to,
+                counts: !direct,
+                goes_on: false,
+            },
+            Some(from) => Behind {
+                state: to,
+                counts: lobe & LOBE_SPECULAR == 0,
+                goes_on: from.goes_on,
+            },
+        };
+        let counts = next.counts && set.accepting() >> to & 1 != 0;
+        let kept = if next.goes_on {
+            fruitful(to, next.counts)
+        } else {
+            counts
+        };
+        kept.then_some(next)
+    };
+    let mut second: Vec<Behind> = Vec::new();
     let mut successors = [u32::MAX; STATES];
     let mut accepting = 0;
-    for (from, state) in first.iter().enumerate() {
-        accepting |= (set.accepting() >> state & 1) << from;
+    let mut from = 0;
+    while from < first.len() + second.len() {
+        let here = from.checked_sub(first.len()).map(|place| second[place]);
+        let state = here.map_or_else(|| first[from], |here| here.state);
+        let counts = here.is_none_or(|here| here.counts);
+        accepting |= (set.accepting() >> state & u32::from(counts)) << from;
         for (symbol, lobe) in (0..PATH_SET_LOBE_COUNT).map(|symbol| (symbol, 1u32 << symbol)) {
-            let to = after(*state, lobe);
-            let place = if to == PATH_SET_DEAD {
+            let to = after(state, lobe);
+            let place = if to == PATH_SET_DEAD || here.is_some_and(|here| !here.goes_on) {
                 PATH_SET_DEAD
-            } else if on_first_floor(lobe) {
+            } else if here.is_none() && on_first_floor(lobe) {
                 first.iter().position(|other| *other == to).unwrap_or(STATES) as u32
-            } else if direct || set.accepting() >> to & 1 == 0 {
-                PATH_SET_DEAD
-            } else {
-                let place = second.iter().position(|other| *other == to).unwrap_or_else(|| {
-                    second.push(to);
+            } else if let Some(next) = behind(here, to, lobe) {
+                let place = second.iter().position(|other| *other == next).unwrap_or_else(|| {
+                    second.push(next);
                     second.len() - 1
                 });
                 (first.len() + place) as u32
+            } else {
+                PATH_SET_DEAD
             };
             if first.len() + second.len() > STATES {
                 return Err("needs more states of eye paths than there are");
@@ -157,9 +222,7 @@ fn eye_states(set: &PathSet, direct: bool) -> Result<(PathSet, Vec<u32>), &'stat
             let shift = PATH_SET_STATE_BITS * symbol;
             successors[from] = successors[from] & !(PATH_SET_DEAD << shift) | place << shift;
         }
-    }
-    for place in first.len()..first.len() + second.len() {
-        accepting |= 1 << place;
+        from += 1;
     }
     Ok((PathSet::of_states(successors, accepting), first))
 }
@@ -190,9 +253,9 @@ mod tests {
             "L.*E",
         ] {
             let set: PathSet = text.parse().unwrap();
-            for direct in [false, true] {
-                let classes = PathClasses::new(&set, direct).unwrap();
-                let (mut inside, mut by_maps) = (0, 0);
+            for [direct, shares] in [[false, false], [true, false], [false, true], [true, true]] {
+                let classes = PathClasses::new(&set, direct, shares).unwrap();
+                let (mut inside, mut by_maps, mut shared) = (0, 0, 0);
                 for _ in 0..20_000 {
                     // From the eye to the light.
                     let length = random.below(6);
@@ -233,23 +296,33 @@ mod tests {
                     if parted(&events).is_some_and(|place| events[place] & (SURFACE_LOBE | LOBE_VOLUME) == 0) {
                         continue;
                     }
-                    assert!(!(by_eye && by_map), "{text}, direct {direct}: {events:?} twice");
-                    assert_eq!(
-                        by_eye || by_map,
-                        set.contains(&from_light),
-                        "{text}, direct {direct}: {events:?}"
-                    );
-                    inside += u32::from(set.contains(&from_light));
+                    let contained = set.contains(&from_light);
+                    inside += u32::from(contained);
                     by_maps += u32::from(by_map);
+                    // What is scattered further behind a medium, and first not by a mirror, both have where they share it.
+                    let further = parted(&events).is_some_and(|at| events[at] == LOBE_VOLUME && at + 1 < events.len());
+                    if shares && further && from_light[0] & LOBE_SPECULAR == 0 {
+                        assert_eq!(
+                            [by_eye, by_map],
+                            [contained; 2],
+                            "{text}, direct {direct}: {events:?} shared"
+                        );
+                        shared += u32::from(contained);
+                        continue;
+                    }
+                    assert!(!(by_eye && by_map), "{text}, direct {direct}: {events:?} twice");
+                    assert_eq!(by_eye || by_map, contained, "{text}, direct {direct}: {events:?}");
                 }
-                assert!(inside > 0 && (by_maps > 0), "{text}: {inside} {by_maps}");
+                assert!(inside > 0 && by_maps > 0, "{text}: {inside} {by_maps}");
+                let some = shares && !["LS+VE", "LS+DE", "L(S|V)*DE", "LD.*E", "LV[DS]*E|LSE"].contains(&text);
+                assert!(!some || shared > 0, "{text}: {shared}");
             }
         }
     }
 
     #[test]
     fn scattering_in_media_is_one_of_the_successors() {
-        let classes = PathClasses::new(&"L.*V.*E".parse().unwrap(), false).unwrap();
+        let classes = PathClasses::new(&"L.*V.*E".parse().unwrap(), false, false).unwrap();
         let next = |class: u32| classes.next_in_media()[0] >> (PATH_SET_STATE_BITS * class) & PATH_SET_DEAD;
         // After a scattering in a medium every state accepts, before it only one behind one.
         assert_eq!([next(0), next(1)], [1, 1]);

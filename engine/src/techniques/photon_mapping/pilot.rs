@@ -50,6 +50,8 @@ pub(super) fn event_share(
         seed: PILOT_SEED,
         aovs: false,
         samples_per_pass: 1,
+        // Nor do eye paths behind the map.
+        volume_paths: false,
         ..settings.clone()
     };
     let more = f64::from(settings.photons) / f64::from(own.photons);

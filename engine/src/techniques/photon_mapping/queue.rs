@@ -1,7 +1,9 @@
 //! Queues of the eye paths that ask a photon map, where they have arrived or on their way through media: which places of a wave a query's invocations are for.
 //!
 //! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.1. Each place's sum is its own, so that the
-//! picture does not depend on the queue. Nothing is compiled, allocated or recorded for a queue that was not asked for.
+//! picture does not depend on the queue. Points and rays have queues in the same memory. Nothing is compiled, allocated or recorded for a queue that was not asked for.
+
+use std::sync::Arc;
 
 use super::settings::MapQueue;
 use crate::catalogue::{Role, Row, sources};
@@ -29,17 +31,16 @@ pub(super) struct AskSpec {
     pub of_rays: bool,
 }
 
-/// A queue with its memory.
-pub(super) enum Queue {
-    /// The places themselves.
+/// What queues of a wave are made of, which points and rays share: each queue is filled and its queries are made before the next one is filled.
+pub(super) enum QueueMemory {
+    /// Nothing: the places themselves.
     Slots,
-    Compacted(Box<Compacted>),
-    Blocks(Box<Blocks>),
+    Compacted(Arc<CompactedMemory>),
+    Blocks(Arc<BlocksMemory>),
 }
 
 /// Flags by place, and their compaction.
-pub(super) struct Compacted {
-    flag: ComputePipeline<photon_queue_flags::Kernel>,
+pub(super) struct CompactedMemory {
     partition: Partition,
     arguments: IndirectCount,
     slots: u32,
@@ -53,28 +54,22 @@ pub(super) struct Compacted {
 }
 
 /// Blocks of places, as wide as subgroups.
-pub(super) struct Blocks {
-    append: ComputePipeline<photon_queue_blocks::Kernel>,
+pub(super) struct BlocksMemory {
     head: Buffer,
     places: Buffer,
     blocks: Buffer,
 }
 
-impl Queue {
-    /// A queue for waves of up to `slots` paths.
+impl QueueMemory {
+    /// For waves of up to `slots` paths.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(gpu: &Gpu, scene: &GpuScene, queue: MapQueue, spec: AskSpec, slots: u32) -> Result<Self> {
+    pub fn new(gpu: &Gpu, queue: MapQueue, slots: u32) -> Result<Self> {
         let words = |name: &str, words: u32| {
             let bytes = u64::from(words) * size_of::<u32>() as u64;
             gpu.buffer(&BufferDesc::storage(name, bytes, Category::Work))
         };
-        let AskSpec {
-            has_path_automaton,
-            counts_bounces,
-            of_rays,
-        } = spec;
         match queue {
             MapQueue::Slots => Ok(Self::Slots),
             MapQueue::Compacted => {
@@ -85,15 +80,7 @@ impl Queue {
                 let partition = Partition::new(gpu, partition)?;
                 let scratch = BufferDesc::storage("gather scratch", partition.scratch_bytes(slots), Category::Work);
                 let head = BufferDesc::storage("gather queue", IndirectCount::BYTES, Category::Work);
-                let flag = surface_spec!(photon_queue_flags, scene, {
-                    has_media: scene.profile().media.any(),
-                    has_path_automaton,
-                    counts_bounces,
-                    of_rays,
-                    ..Default::default()
-                });
-                Ok(Self::Compacted(Box::new(Compacted {
-                    flag: gpu.compute_pipeline(&flag)?,
+                Ok(Self::Compacted(Arc::new(CompactedMemory {
                     arguments: IndirectCount::new(gpu)?,
                     slots,
                     head: gpu.buffer(&head)?,
@@ -106,6 +93,67 @@ impl Queue {
                 })))
             }
             MapQueue::Blocks => {
+                // Only the last block of a team is partial, and its team had walked a block's places for it.
+                let places = slots.next_multiple_of(PLACES_PER_GROUP);
+                let head = BufferDesc::storage("gather queue", size_of::<Head>() as u64, Category::Work);
+                Ok(Self::Blocks(Arc::new(BlocksMemory {
+                    head: gpu.buffer(&head)?,
+                    places: words("gather places", places)?,
+                    // However narrow blocks are.
+                    blocks: words("gather blocks", places)?,
+                })))
+            }
+        }
+    }
+}
+
+/// A queue: what fills it, and its memory.
+pub(super) enum Queue {
+    /// The places themselves.
+    Slots,
+    Compacted(Compacted),
+    Blocks(Blocks),
+}
+
+/// Flags places that ask, and compacts them.
+pub(super) struct Compacted {
+    flag: ComputePipeline<photon_queue_flags::Kernel>,
+    memory: Arc<CompactedMemory>,
+}
+
+/// Appends blocks of places that ask.
+pub(super) struct Blocks {
+    append: ComputePipeline<photon_queue_blocks::Kernel>,
+    memory: Arc<BlocksMemory>,
+}
+
+impl Queue {
+    /// A queue in this memory.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new(gpu: &Gpu, scene: &GpuScene, memory: &QueueMemory, spec: AskSpec) -> Result<Self> {
+        let AskSpec {
+            has_path_automaton,
+            counts_bounces,
+            of_rays,
+        } = spec;
+        match memory {
+            QueueMemory::Slots => Ok(Self::Slots),
+            QueueMemory::Compacted(memory) => {
+                let flag = surface_spec!(photon_queue_flags, scene, {
+                    has_media: scene.profile().media.any(),
+                    has_path_automaton,
+                    counts_bounces,
+                    of_rays,
+                    ..Default::default()
+                });
+                Ok(Self::Compacted(Compacted {
+                    flag: gpu.compute_pipeline(&flag)?,
+                    memory: Arc::clone(memory),
+                }))
+            }
+            QueueMemory::Blocks(memory) => {
                 // Both are powers of two, so that the lesser one divides the other.
                 let queue_width = gpu.caps().subgroup_size.clamp(1, WALK_GROUP);
                 let append = surface_spec!(photon_queue_blocks, scene, {
@@ -116,16 +164,10 @@ impl Queue {
                     of_rays,
                     ..Default::default()
                 });
-                // Only the last block of a team is partial, and its team had walked a block's places for it.
-                let places = slots.next_multiple_of(PLACES_PER_GROUP);
-                let head = BufferDesc::storage("gather queue", size_of::<Head>() as u64, Category::Work);
-                Ok(Self::Blocks(Box::new(Blocks {
+                Ok(Self::Blocks(Blocks {
                     append: gpu.compute_pipeline(&append)?,
-                    head: gpu.buffer(&head)?,
-                    places: words("gather places", places)?,
-                    // However narrow blocks are.
-                    blocks: words("gather blocks", places)?,
-                })))
+                    memory: Arc::clone(memory),
+                }))
             }
         }
     }
@@ -164,17 +206,17 @@ impl Queue {
         };
         match self {
             Self::Slots => none,
-            Self::Compacted(queue) => GatherQueue {
-                gather_head: queue.head.view(),
-                gather_places: queue.places.view(),
-                gather_flags: queue.flags.view(),
-                gather_flag_count: queue.flag_count.view(),
+            Self::Compacted(Compacted { memory, .. }) => GatherQueue {
+                gather_head: memory.head.view(),
+                gather_places: memory.places.view(),
+                gather_flags: memory.flags.view(),
+                gather_flag_count: memory.flag_count.view(),
                 ..none
             },
-            Self::Blocks(queue) => GatherQueue {
-                gather_head: queue.head.view(),
-                gather_places: queue.places.view(),
-                gather_blocks: queue.blocks.view(),
+            Self::Blocks(Blocks { memory, .. }) => GatherQueue {
+                gather_head: memory.head.view(),
+                gather_places: memory.places.view(),
+                gather_blocks: memory.blocks.view(),
                 ..none
             },
         }
@@ -200,39 +242,39 @@ impl Queue {
         let scene = scene.scene_set();
         match self {
             Self::Slots => Ok(places.items),
-            Self::Compacted(queue) => {
-                reset(pass, &queue.flag_count, &[0])?;
+            Self::Compacted(Compacted { flag, memory }) => {
+                reset(pass, &memory.flag_count, &[0])?;
                 let push = photon_queue_flags::Push { ask };
-                pass.dispatch_indirect(&queue.flag, &[wave, &scene, set], &push, places.items)?;
+                pass.dispatch_indirect(flag, &[wave, &scene, set], &push, places.items)?;
                 stage_barrier(pass);
                 let buffers = PartitionBuffers {
-                    flags: queue.flags.view(),
+                    flags: memory.flags.view(),
                     input: None,
-                    output: queue.places.view(),
-                    flagged: queue.asking.view(),
+                    output: memory.places.view(),
+                    flagged: memory.asking.view(),
                 };
                 let count = Count::Device {
-                    view: queue.flag_count.view(),
-                    capacity: queue.slots,
+                    view: memory.flag_count.view(),
+                    capacity: memory.slots,
                 };
-                queue.partition.record(pass, &buffers, count, &queue.scratch)?;
+                memory.partition.record(pass, &buffers, count, &memory.scratch)?;
                 stage_barrier(pass);
-                queue
+                memory
                     .arguments
-                    .record(pass, queue.asking.view(), queue.slots, WALK_GROUP, &queue.head)?;
+                    .record(pass, memory.asking.view(), memory.slots, WALK_GROUP, &memory.head)?;
                 stage_barrier(pass);
-                Ok(queue.head.slice(0, size_of::<[u32; 3]>() as u64))
+                Ok(memory.head.slice(0, size_of::<[u32; 3]>() as u64))
             }
-            Self::Blocks(queue) => {
+            Self::Blocks(Blocks { append, memory }) => {
                 let empty = Head {
                     groups: [0, 1, 1],
                     ..Head::default()
                 };
-                reset(pass, &queue.head, bytemuck::cast_slice(&[empty]))?;
+                reset(pass, &memory.head, bytemuck::cast_slice(&[empty]))?;
                 let push = photon_queue_blocks::Push { ask };
-                pass.dispatch_indirect(&queue.append, &[wave, &scene, set], &push, places.chunks)?;
+                pass.dispatch_indirect(append, &[wave, &scene, set], &push, places.chunks)?;
                 stage_barrier(pass);
-                Ok(queue.head.slice(0, size_of::<[u32; 3]>() as u64))
+                Ok(memory.head.slice(0, size_of::<[u32; 3]>() as u64))
             }
         }
     }
@@ -273,6 +315,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/photon/queues.rs::queues_take_queries_that_a_quota_stops",
             "tests/tests/photon/queues.rs::queues_may_stay_empty",
+            "tests/tests/photon/volume_queues.rs::points_and_rays_share_the_memory_of_their_queues",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_go_through_grids",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_wait_for_walks_through_grids",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_are_the_same_in_parts",
@@ -296,7 +339,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/queues.rs::queues_never_show_on_any_number_of_threads",
             "tests/tests/photon/queues.rs::blocks_need_no_subgroup_operations",
             "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
-            "tests/tests/photon/volume_queues.rs::queues_and_packets_see_planes_and_beams",
+            "tests/tests/photon/volume_queues.rs::planes_are_the_same_in_every_form_on_any_number_of_threads",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_never_show_on_any_number_of_threads",
         ],
         settings: &["queue"],

@@ -152,6 +152,11 @@ crate::settings! {
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
         /// From which size on kernels in media that follow footprints grow slower, by a logarithm, in unit lengths; 0 leaves them as they are.
         pub volume_dampening: f32 = 3.0, in 0.0..;
+        /// Eye paths go on behind their first scattering in a medium, and share the light that they find there with collisions and ways, each weighted by what the others have of it; for
+        /// `unified` alone, and not with final_gather.
+        ///
+        /// They take time for a share that is small where there are many photons; most worth it under narrow kernels.
+        pub volume_paths: bool = false;
         /// Takes direct light from the map, too, instead of by shadow rays; cannot be combined with final_gather.
         pub direct_photons: bool = false;
         /// Sees the map after one more diffuse reflection, caustics directly; cannot be combined with direct_photons.
@@ -163,7 +168,7 @@ crate::settings! {
         /// (experiments `photon-queues` and `volume-queues`).
         pub query: MapQuery = MapQuery::Single;
         /// Invocations of queries serve every path under way, or only those that query the map in question, found by stream compaction or in blocks that
-        /// subgroups collect; changes pictures only as query does.
+        /// subgroups collect; changes pictures only as query does. Rays have each queue, single and in packets, with every estimate of volume.
         pub queue: MapQueue = MapQueue::Slots;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.
@@ -199,6 +204,14 @@ impl PhotonSettings {
                 self.volume.word()
             );
             return Err(Error::setting("volume_kernel", self.volume_kernel.word(), cause));
+        }
+        if self.volume_paths && self.volume != VolumeEstimate::Unified {
+            let cause = format!("needs \"volume\": \"unified\", but that is \"{}\"", self.volume.word());
+            return Err(Error::setting("volume_paths", true, cause));
+        }
+        if self.volume_paths && self.final_gather {
+            let cause = "cannot be combined with final_gather, behind which the map is seen";
+            return Err(Error::setting("volume_paths", true, cause));
         }
         if self.direct_photons && self.final_gather {
             let cause = "cannot be combined with direct_photons: direct light would be seen twice";
@@ -346,6 +359,7 @@ impl PhotonSettings {
             even_survival: false,
             stores_lights: false,
             only_rough: false,
+            tells_lights: has_media && self.volume_paths,
             stored: self.stored(),
         }
     }
@@ -369,11 +383,11 @@ impl PhotonSettings {
             .is_none_or(|max| max > u32::from(!self.direct_photons))
     }
 
-    /// How an expression's light paths are parted; `None` for a range of bounces.
+    /// How an expression's light paths are parted; `None` for a range of bounces. `shares`: eye paths go on in media.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for an expression beside a range of bounces, behind a final gather, and one that tells too much apart.
-    pub(super) fn classes(&self) -> Result<Option<PathClasses>> {
+    pub(super) fn classes(&self, shares: bool) -> Result<Option<PathClasses>> {
         let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
         if self.path_set == PathSet::new(min, max, PATH_SET_LOBES)? {
             return Ok(None);
@@ -391,18 +405,19 @@ impl PhotonSettings {
         if self.final_gather {
             return Err(refuse("is none that a final gather can part"));
         }
-        PathClasses::new(&self.path_set, self.direct_photons)
+        PathClasses::new(&self.path_set, self.direct_photons, shares)
             .map(Some)
             .map_err(refuse)
     }
 
     /// What eye paths gather by themselves: light seen through specular and glossy scattering, and direct light at the first diffuse surface
-    /// (with a final gather, at the second too), in scenes with media also at the first scattering in a medium.
+    /// (with a final gather, at the second too), in scenes with media also at the first scattering in a medium; where it `shares` light with photons all behind that, but light that a mirror
+    /// scatters first.
     ///
     /// # Errors
     /// [`Error::Unsupported`] as [`classes`](PhotonSettings::classes), [`Error::Setting`] for more bounces than records can count.
-    pub(super) fn eye_paths(&self, has_media: bool) -> Result<PathSet> {
-        if let Some(classes) = self.classes()? {
+    pub(super) fn eye_paths(&self, has_media: bool, shares: bool) -> Result<PathSet> {
+        if let Some(classes) = self.classes(shares)? {
             return Ok(classes.eye);
         }
         let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
@@ -411,6 +426,8 @@ impl PhotonSettings {
             return Err(Error::setting("path_set", self.path_set, cause));
         }
         let seen = match (self.direct_photons, self.final_gather, has_media) {
+            (true, _, _) if shares => "L[SG]*E|L[DGV].*V[SG]*E",
+            (false, _, true) if shares => "L[DV]?[SG]*E|L[DGV].*V[SG]*E",
             (true, _, _) => "L[SG]*E",
             (false, false, false) => "LD?[SG]*E",
             (false, true, false) => "L[SG]*E|LD[SG]*E|LD[SG]*D[SG]*E",

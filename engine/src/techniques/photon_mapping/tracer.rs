@@ -9,28 +9,35 @@
 //! emitted have escaped or were absorbed, to the count; records that do not fit are never lost silently, since the pass is traced again
 //! with room for them; a submission is a bounded piece of work.
 
+mod append;
+mod plan;
+mod stages;
+
+pub(in crate::techniques) use append::Append;
+pub(super) use append::PhotonAppend;
+pub use plan::PhotonCounts;
+pub(in crate::techniques) use plan::{PhotonPlan, Stored};
+
 use std::sync::Arc;
 
+use self::stages::PhotonStages;
 use super::glow::GlowStage;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
 use super::volume::footprint::EventKernelSettings;
 use super::volume::ways::BeamLength;
-use super::volume::{Room, VolumeEstimate, VolumeOptions, VolumePass, VolumeTrace};
+use super::volume::{VolumeEstimate, VolumeOptions, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
-use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{PHOTON_QUARTERS, WALK_GROUP};
-use crate::gpu::shaders::sets::{PhotonWave, WaveSet};
-use crate::gpu::shaders::techniques::photon_mapping::{photon_append, photon_emit, photon_scatter};
-use crate::gpu::shaders::types::{self, Differentials};
-use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder};
-use crate::gpu::{TexelView, Timings};
-use crate::transport::random::SamplerKind;
+use crate::gpu::shaders::constants::WALK_GROUP;
+use crate::gpu::shaders::sets::PhotonWave;
+use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
+use crate::gpu::shaders::types::Differentials;
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, TexelView, Timings};
+use crate::transport::photon_share::placeless_distance2;
 use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
-    Bounce, WalkKey, WalkOptions, WalkStages, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots,
-    slots_of_device, stage_barrier,
+    WalkKey, WalkOptions, Walked, Walker, WaveBuffers, WaveInFlight, WaveNeeds, default_slots, slots_of_device,
 };
 use crate::{Error, Result};
 
@@ -40,149 +47,6 @@ const BOUNCES_PER_SUBMISSION: usize = 8;
 const RECORDS_PER_PHOTON: u64 = 4;
 /// Tells the photons' random numbers from those of eye paths.
 const PHOTON_SEED: u32 = 0x7068_6f74;
-/// Length of the pieces that ways are stored in, as a share of the diagonal of the scene's box: boxes of long ones hold much beside them.
-const WAY_PIECE_SHARE: f32 = 1.0 / 16.0;
-/// Scatterings that photons are followed through at most, so that none is followed for ever between lossless surfaces.
-const BOUNCES_MAX: u32 = 4096;
-
-/// Exact counts of a pass, or of several.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
-#[non_exhaustive]
-pub struct PhotonCounts {
-    /// Photons emitted.
-    pub emitted: u64,
-    /// Photons that left the scene.
-    pub escaped: u64,
-    /// Photons that ended on a surface or in a medium: by roulette, where nothing is scattered, or after the last bounce.
-    pub absorbed: u64,
-    /// Rays traced.
-    pub rays: u64,
-    /// Hits that were to be stored.
-    pub deposits: u64,
-    /// Those that were not, since their footprint is degenerate.
-    pub without_kernel: u64,
-    /// Collisions with media.
-    pub collisions: u64,
-    /// Those that were stored.
-    pub events: u64,
-}
-
-impl std::ops::AddAssign for PhotonCounts {
-    fn add_assign(&mut self, other: Self) {
-        self.emitted += other.emitted;
-        self.escaped += other.escaped;
-        self.absorbed += other.absorbed;
-        self.rays += other.rays;
-        self.deposits += other.deposits;
-        self.without_kernel += other.without_kernel;
-        self.collisions += other.collisions;
-        self.events += other.events;
-    }
-}
-
-/// What is stored of photons: those scattered at least and at most so often before they land.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::techniques) struct Stored {
-    pub first_bounce: u32,
-    pub last_bounce: u32,
-}
-
-/// What photons are traced for, and how.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::techniques) struct PhotonPlan {
-    /// Photons of a pass.
-    pub photons: u32,
-    pub sampler: SamplerKind,
-    pub seed: u32,
-    /// As [`WalkOptions::work`].
-    pub submission_work: u64,
-    /// They carry footprints.
-    pub follows_footprints: bool,
-    /// They know whether they were scattered diffusely.
-    pub tells_caustics: bool,
-    /// One number of each photon, evenly spread over a pass, decides how far it comes.
-    pub even_survival: bool,
-    /// Deposits are those of virtual lights: of all surfaces that scatter into more than one direction, with the power that arrives.
-    pub stores_lights: bool,
-    /// Photons are scattered by diffuse and glossy lobes alone: one specular scattering makes another path set.
-    pub only_rough: bool,
-    pub stored: Stored,
-}
-
-/// What a bounce's deposits are made into.
-pub(in crate::techniques) trait Append: Send {
-    /// Of a record, in texels of four words.
-    fn quarters(&self) -> u32;
-
-    /// Of its kernel, in errors.
-    fn name(&self) -> &'static str;
-
-    /// What its records are, in errors.
-    fn records(&self) -> &'static str;
-
-    /// What to do where there are more of them than the device can hold, in errors.
-    fn fewer(&self) -> &'static str;
-
-    fn pipeline(&self) -> PipelineInfo;
-
-    /// Records what makes those that wait into records behind `first` and the wave's earlier ones, as far as there is room for `capacity`.
-    ///
-    /// # Errors
-    /// Those of recording.
-    fn append(
-        &self,
-        pass: &mut Pass<'_>,
-        bounce: &Bounce<'_>,
-        scene: &GpuScene,
-        photons: &PhotonWave<'_>,
-        first: u32,
-        capacity: u32,
-    ) -> Result<()>;
-}
-
-/// Deposits become records of a photon map.
-pub(super) struct PhotonAppend(ComputePipeline<photon_append::Kernel>);
-
-impl PhotonAppend {
-    pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self(gpu.compute_pipeline(&())?))
-    }
-}
-
-impl Append for PhotonAppend {
-    fn quarters(&self) -> u32 {
-        PHOTON_QUARTERS
-    }
-
-    fn name(&self) -> &'static str {
-        "photon_append"
-    }
-
-    fn records(&self) -> &'static str {
-        "photon records"
-    }
-
-    fn fewer(&self) -> &'static str {
-        "trace fewer photons per pass: setting `photons`"
-    }
-
-    fn pipeline(&self) -> PipelineInfo {
-        self.0.info()
-    }
-
-    fn append(
-        &self,
-        pass: &mut Pass<'_>,
-        bounce: &Bounce<'_>,
-        _: &GpuScene,
-        photons: &PhotonWave<'_>,
-        first: u32,
-        capacity: u32,
-    ) -> Result<()> {
-        let push = photon_append::Push { first, capacity };
-        pass.dispatch_indirect(&self.0, &[&bounce.wave, photons], &push, bounce.places.waiting)
-    }
-}
 
 /// Photons of one pass.
 #[derive(Default)]
@@ -202,9 +66,9 @@ pub(in crate::techniques) struct Tracing {
     kernel: Option<KernelSettings>,
     /// Kernels of events in media, if there are some.
     event_kernel: Option<EventKernelSettings>,
-    /// [`VolumePass::path_share`].
+    /// [`VolumePass::path_share`](super::volume::VolumePass::path_share).
     path_share: f64,
-    /// [`VolumePass::plane_share`].
+    /// [`VolumePass::plane_share`](super::volume::VolumePass::plane_share).
     plane_share: f64,
     /// First photon of the wave under way, or of the next one.
     first_photon: u32,
@@ -252,6 +116,8 @@ struct Kit {
     stored: Stored,
     /// Of a pass.
     photons: u32,
+    /// [`PhotonPlan::tells_lights`].
+    tells_lights: bool,
     append: Box<dyn Append>,
     emit: ComputePipeline<photon_emit::Kernel>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
@@ -268,19 +134,6 @@ struct Kit {
     volume: Option<VolumeTrace>,
     /// Of expressions: successors of classes, and those by scattering in media.
     classes: Option<(Buffer, [u32; 2])>,
-}
-
-/// The stages of a wave of photons.
-struct PhotonStages<'a> {
-    kit: &'a Kit,
-    key: WalkKey,
-    /// Record of the wave's first deposit on a surface, and of its first one in a medium.
-    first: u32,
-    first_event: u32,
-    kernel: Option<&'a KernelSettings>,
-    event_kernel: Option<&'a EventKernelSettings>,
-    path_share: f64,
-    plane_share: f64,
 }
 
 impl PhotonTracer {
@@ -319,6 +172,7 @@ impl PhotonTracer {
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
             only_rough: plan.only_rough,
+            tells_lights: plan.tells_lights,
             even_survival: plan.even_survival,
             has_media: profile.media.any(),
             has_classes: classes.is_some(),
@@ -372,6 +226,7 @@ impl PhotonTracer {
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
+                tells_lights: plan.tells_lights,
                 append,
             },
             gpu: gpu.clone(),
@@ -543,6 +398,16 @@ impl PhotonTracer {
 }
 
 impl Kit {
+    /// What photons of light without a place carry, m²; 0 where none tell their light.
+    fn placeless2(&self) -> f32 {
+        let [lower, upper] = self.scene.bounds().map(|corner| corner.as_dvec3());
+        if self.tells_lights {
+            placeless_distance2(lower, upper) as f32
+        } else {
+            0.0
+        }
+    }
+
     fn wave_set(&self) -> PhotonWave<'_> {
         PhotonWave {
             photon_counters: self.counters.view(),
@@ -550,130 +415,6 @@ impl Kit {
             photon_records: self.records.buffer().view(),
             photon_class_successors: self.classes.as_ref().map_or(&self.counters, |(words, _)| words).view(),
         }
-    }
-}
-
-impl PhotonStages<'_> {
-    /// Photons leave the lights, which send that share of them.
-    fn record_lights(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, share: f64) -> Result<()> {
-        let kit = self.kit;
-        let [lower, upper] = kit.scene.bounds();
-        let push = photon_emit::Push {
-            scene_lower: lower.to_array(),
-            radius: 0.5 * (upper - lower).length(),
-            scene_upper: upper.to_array(),
-            key: self.key,
-            photons: kit.photons,
-            share: share as f32,
-            weight: (1.0 / share) as f32,
-        };
-        recorder.pass("photon: emit", |pass| {
-            let groups = [kit.emit.groups_for(self.key.indices), 1, 1];
-            let (scene, own) = (kit.scene.emission_set(kit.emission.as_ref()), kit.wave_set());
-            pass.dispatch(&kit.emit, &[wave, &scene, &own], &push, groups)?;
-            stage_barrier(pass);
-            Ok(())
-        })
-    }
-}
-
-impl WalkStages for PhotonStages<'_> {
-    fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
-        self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.reset(pass))?;
-        pass.fill(self.kit.counters.view(), 0)
-    }
-
-    /// Photons leave the lights, or start in media that emit.
-    fn record_start(&self, recorder: &mut Recorder, wave: &WaveSet<'_>) -> Result<()> {
-        let kit = self.kit;
-        let share = 1.0 - kit.glow.as_ref().map_or(0.0, GlowStage::share);
-        if share > 0.0 {
-            self.record_lights(recorder, wave, share)?;
-        }
-        let Some(glow) = &kit.glow else { return Ok(()) };
-        recorder.pass("photon: glow", |pass| {
-            glow.record(pass, wave, &kit.scene, &kit.differentials, self.key)
-        })
-    }
-
-    fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
-        let (kit, kernel) = (self.kit, self.kernel);
-        let [lower, upper] = kit.scene.bounds();
-        if let Some(volume) = &kit.volume {
-            let told = VolumePass {
-                key: self.key,
-                first_deposit: kit.stored.first_bounce,
-                last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
-                flux_scale: flux_scale(&kit.scene) as f32,
-                piece: WAY_PIECE_SHARE * (upper - lower).length(),
-                body_reach: (upper - lower).length(),
-                classes: kit.classes.as_ref().map_or([0; 2], |(_, in_media)| *in_media),
-                kernel: self.event_kernel.copied(),
-                path_share: self.path_share as f32,
-                plane_share: self.plane_share as f32,
-            };
-            recorder.pass("photon: medium", |pass| {
-                volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)
-            })?;
-        }
-        let push = photon_scatter::Push {
-            scene_lower: lower.to_array(),
-            last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
-            scene_upper: upper.to_array(),
-            first_deposit: kit.stored.first_bounce,
-            key: self.key,
-            flux_scale: flux_scale(&kit.scene) as f32,
-            kernel: kernel.map_or_else(Default::default, |kernel| types::KernelSettings {
-                shape: kernel.shape as u32,
-                spread: kernel.spread as f32,
-                exponent: kernel.exponent as f32,
-                unit_length: kernel.unit_length as f32,
-                length_min: kernel.length_min as f32,
-                length_max: kernel.length_max as f32,
-                flatness: kernel.flatness as f32,
-                widens_flat: u32::from(kernel.widens_flat),
-            }),
-        };
-        recorder.pass("photon: scatter", |pass| {
-            let (scene, own) = (kit.scene.scene_set(), kit.wave_set());
-            let sets: [&dyn BindingSet<'_>; 3] = [&bounce.wave, &scene, &own];
-            pass.dispatch_indirect(&kit.scatter, &sets, &push, bounce.places.items)?;
-            stage_barrier(pass);
-            Ok(())
-        })
-    }
-
-    /// The deposits become records.
-    fn record_waiting(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
-        let kit = self.kit;
-        recorder.pass("photon: append", |pass| {
-            let own = kit.wave_set();
-            if let Some(volume) = &kit.volume {
-                let rooms = [
-                    Room {
-                        first: self.first,
-                        capacity: kit.capacity,
-                    },
-                    Room {
-                        first: self.first_event,
-                        capacity: volume.capacity(),
-                    },
-                ];
-                return volume.record_append(pass, bounce, &kit.differentials, &own, rooms);
-            }
-            kit.append
-                .append(pass, bounce, &kit.scene, &own, self.first, kit.capacity)?;
-            stage_barrier(pass);
-            Ok(())
-        })
-    }
-
-    fn read_back(&self, pass: &mut Pass<'_>) -> Result<()> {
-        self.kit
-            .volume
-            .as_ref()
-            .map_or(Ok(()), |volume| volume.read_back(pass))?;
-        pass.copy(self.kit.counters.view(), self.kit.counters_readback.view())
     }
 }
 
@@ -729,6 +470,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/lights.rs::points_spots_and_suns_shine_as_they_should",
             "tests/tests/photon/lights.rs::lamps_and_skies_shine_as_they_should",
             "tests/tests/photon/materials.rs::walls_of_all_kinds_light_the_floor",
+            "tests/tests/photon/materials.rs::walls_of_which_normals_fan_out_light_the_floor",
             "tests/tests/photon/materials.rs::lights_inside_a_body_that_absorbs_shine_through_it",
             "engine/src/transport/gpu_scene/bodies.rs::lights_know_which_body_is_around_them",
             "engine/src/transport/gpu_scene/glow.rs::tries_find_places_as_often_as_they_should",

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::card::{NO_CLASSIC, NO_MEDIA, NO_PHONG};
 use super::lights::{LightRoom, PreviewLights, PreviewShadows};
+use super::probe::ProbeMap;
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use crate::gpu::{Area, Gpu, PipelineInfo, Recorder};
 use crate::raster::{DrawPart, GBuffer, GBufferDesc, Layering, Surfaces, View};
@@ -29,7 +30,7 @@ impl Drawing {
         size: [u32; 2],
         lights: LightRoom,
         shadows: Option<PreviewShadows>,
-        has_probes: bool,
+        probes: Option<ProbeMap>,
     ) -> Result<Self> {
         if lights.all > LIGHTS_MAX {
             let cause = format!("are more than {LIGHTS_MAX}");
@@ -41,13 +42,13 @@ impl Drawing {
                 reasons: vec![NO_MEDIA.into()],
             });
         }
-        if has_probes && scene.profile().has_phong {
+        if probes.is_some() && scene.profile().has_phong {
             return Err(Error::Unsupported {
                 technique: "preview".into(),
                 reasons: vec![NO_PHONG.into()],
             });
         }
-        if has_probes && scene.profile().has_classic_microfacets {
+        if probes.is_some() && scene.profile().has_classic_microfacets {
             return Err(Error::Unsupported {
                 technique: "preview".into(),
                 reasons: vec![NO_CLASSIC.into()],
@@ -66,7 +67,7 @@ impl Drawing {
         let lights = PreviewLights::new(gpu, &surfaces, lights, shadows)?;
         Ok(Self {
             gbuffer,
-            shade: Shade::new(gpu, scene, &lights, false, has_probes)?,
+            shade: Shade::new(gpu, scene, &lights, false, probes)?,
             lights,
         })
     }

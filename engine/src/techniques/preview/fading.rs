@@ -186,7 +186,7 @@ pub(super) const ROWS: &[Row] = &[Row {
     id: "MET-E2",
     name: "a map drawn anew at the place of an object that moves, each frame or now and then, with a cross-fade from one map to the next",
     role: Role::PartOf("CL-LIVE-MAP"),
-    limits: "A fresh map leaves a sphere of a third of a room's half width ten degrees of parallax; what moves shows twice during a fade, which takes a second map; maps are octahedra alone.",
+    limits: "A fresh map leaves a sphere of a third of a room's half width ten degrees of parallax; what moves shows twice during a fade, which takes a second map.",
     sources: &[sources::GREENE_1986.whole(), sources::SZIRMAY_KALOS_2009.whole()],
     shaders: &["shaders/techniques/preview/probe_fade.comp"],
     bias: Some(Bias::Biased(

@@ -2,7 +2,7 @@
 //!
 //! Sources: N. Greene, "Environment Mapping and Other Applications of World Projections", IEEE CG&A 6(11), 1986 (maps of a scene from an object's
 //! middle); T. Engelhardt and C. Dachsbacher, "Octahedron Environment Maps", VMV 2008 (drawn live, one picture). The eight octants are drawn side
-//! by side, shaded as a camera's picture is, and filtered ([`LightProbe`]).
+//! by side, or the six faces of a cube one after the other, shaded as a camera's picture is, and filtered ([`LightProbe`]).
 //!
 //! Bias: radiance at texel centres stands for its mean over the texel; what light does among surfaces beyond direct light is in it as far as a
 //! probe that lights them says, which may be this one of the frame before. Seen from elsewhere than its point, a reflection shows what lies in the same
@@ -11,45 +11,53 @@
 
 use glam::Vec3;
 
-use super::probe::{LightProbe, LightProbeDesc};
+use super::probe::{LightProbe, LightProbeDesc, ProbeMap};
 use super::shade::{Eye, OUTPUTS, PreviewPart, Seen, Shade, Target};
 use super::{Preview, PreviewLights};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::{Area, Gpu, Recorder};
+use crate::maps::cube::CUBE_FACES;
 use crate::maps::directional_map::DirectionalMap;
 use crate::maps::octahedron::OctahedronLayout;
 use crate::raster::{GBuffer, GBufferDesc, Layering, OctantCut, Output, Surfaces, View};
 use crate::transport::GpuScene;
 use crate::{Error, Result};
 
-/// What draws a scene around a place into an octahedron map.
+/// What draws a scene around a place into a map.
 #[derive(Debug)]
 pub(super) struct LiveDrawing {
+    map: ProbeMap,
+    /// Of an octahedron, or of one face of a cube.
     gbuffer: GBuffer,
     shade: Shade,
 }
 
 impl LiveDrawing {
-    /// For a map of so many texels along a side; its surfaces are lit as those of the preview, and by probes where `has_probes` says so. `outputs` are drawn beside what shading reads.
+    /// For a map of so many texels along a side; its surfaces are lit as those of the preview, and by probes where there are some. `outputs` are drawn beside what shading reads.
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
         lights: &PreviewLights,
-        (side, outputs): (u32, &[Output]),
-        has_probes: bool,
+        (map, side, outputs): (ProbeMap, u32, &[Output]),
+        probes: Option<ProbeMap>,
     ) -> Result<Self> {
+        let layering = match map {
+            ProbeMap::Octahedron => Layering::Octants(OctantCut::default()),
+            ProbeMap::Cube => Layering::One,
+        };
         let gbuffer = GBuffer::new(
             gpu,
             &scene.surfaces(),
             &GBufferDesc {
                 size: [side; 2],
-                layering: Layering::Octants(OctantCut::default()),
+                layering,
                 outputs: &[&OUTPUTS[..], outputs].concat(),
             },
         )?;
         Ok(Self {
+            map,
             gbuffer,
-            shade: Shade::new(gpu, scene, lights, true, has_probes)?,
+            shade: Shade::new(gpu, scene, lights, map == ProbeMap::Octahedron, probes)?,
         })
     }
 
@@ -57,7 +65,7 @@ impl LiveDrawing {
         self.gbuffer.bytes()
     }
 
-    /// Records two passes: what of `surfaces` is seen from a place (metres), and its shading by the preview's lights and by a probe, into level 0 of a
+    /// Records two passes, for each face of a cube: what of `surfaces` is seen from a place (metres), and its shading by the preview's lights and by a probe, into level 0 of a
     /// map, which is visible to compute shaders afterwards.
     pub fn record(
         &self,
@@ -74,31 +82,43 @@ impl LiveDrawing {
         let side = self.gbuffer.size()[0];
         let near = View::near_plane(place, surfaces);
         let area = Area::whole([side; 2]);
-        let views = View::of_octants(place, OctahedronLayout::Quadratic, near, area)?;
-        self.gbuffer.record(recorder, surfaces, &views)?;
-        recorder.pass("preview: shade live map", |pass| {
-            let level = map.level(0)?;
-            let border = map.border();
-            let stride = side + 2 * border;
-            let target = Target {
-                buffer: map.texels(),
-                first: level.first + border * (stride + 1),
-                stride,
-            };
-            let part = PreviewPart {
-                triangles: 0..surfaces.triangles,
-                background: true,
-                probe: by,
-            };
-            let seen = Seen {
-                scene,
-                gbuffer: &self.gbuffer,
-                lights: preview.lights(),
-                eye: Eye::AllDirections(place),
-                target,
-            };
-            self.shade.record(pass, &seen, &[part])
-        })
+        let level = map.level(0)?;
+        let mut draw = |views: &[View], eye, first, stride| {
+            self.gbuffer.record(recorder, surfaces, views)?;
+            recorder.pass("preview: shade live map", |pass| {
+                let part = PreviewPart {
+                    triangles: 0..surfaces.triangles,
+                    background: true,
+                    probe: by,
+                };
+                let seen = Seen {
+                    scene,
+                    gbuffer: &self.gbuffer,
+                    lights: preview.lights(),
+                    eye,
+                    target: Target {
+                        buffer: map.texels(),
+                        first,
+                        stride,
+                    },
+                };
+                self.shade.record(pass, &seen, &[part])
+            })
+        };
+        match self.map {
+            ProbeMap::Octahedron => {
+                let border = map.border();
+                let stride = side + 2 * border;
+                let views = View::of_octants(place, OctahedronLayout::Quadratic, near, area)?;
+                let first = level.first + border * (stride + 1);
+                draw(&views, Eye::AllDirections(place), first, stride)
+            }
+            ProbeMap::Cube => (0..CUBE_FACES).try_for_each(|face| {
+                let view = View::of_cube_face(place, face, near, area)?;
+                let first = level.first + face * side * side;
+                draw(&[view], Eye::CubeFace(place, face), first, side)
+            }),
+        }
     }
 }
 
@@ -110,10 +130,10 @@ pub struct LiveProbe {
 }
 
 impl LiveProbe {
-    /// Allocates a probe and what draws it; its surfaces are lit as those of the preview, and by probes where `has_probes` says so.
+    /// Allocates a probe and what draws it; its surfaces are lit as those of the preview, and by probes of the same map where `has_probes` says so.
     ///
     /// # Errors
-    /// As [`LightProbe::new`]; [`Error::MissingFeature`] where clip distances are missing.
+    /// As [`LightProbe::new`]; [`Error::MissingFeature`] for octahedra where clip distances are missing.
     pub fn new(gpu: &Gpu, scene: &GpuScene, preview: &Preview, desc: LightProbeDesc, has_probes: bool) -> Result<Self> {
         Self::make(gpu, scene, preview, (desc, &[]), has_probes)
     }
@@ -121,7 +141,7 @@ impl LiveProbe {
     /// As [`LiveProbe::new`], with distances and normals of what its place sees, 12 bytes a texel more, for [`SearchedReflections`](super::SearchedReflections).
     ///
     /// # Errors
-    /// As [`LiveProbe::new`].
+    /// As [`LiveProbe::new`]; [`Error::Setting`] for a cube, whose distances nothing searches here.
     pub fn with_distances(
         gpu: &Gpu,
         scene: &GpuScene,
@@ -129,6 +149,10 @@ impl LiveProbe {
         desc: LightProbeDesc,
         has_probes: bool,
     ) -> Result<Self> {
+        if desc.map != ProbeMap::Octahedron {
+            let cause = "has no distances here; an octahedron has, and maps::impostor searches cubes";
+            return Err(Error::setting("map of a live probe", format!("{:?}", desc.map), cause));
+        }
         let outputs = [Output::Distance, Output::Normals];
         Self::make(gpu, scene, preview, (desc, &outputs), has_probes)
     }
@@ -142,7 +166,13 @@ impl LiveProbe {
     ) -> Result<Self> {
         Ok(Self {
             probe: LightProbe::new(gpu, desc)?,
-            drawing: LiveDrawing::new(gpu, scene, preview.lights(), (desc.side, outputs), has_probes)?,
+            drawing: LiveDrawing::new(
+                gpu,
+                scene,
+                preview.lights(),
+                (desc.map, desc.side, outputs),
+                has_probes.then_some(desc.map),
+            )?,
         })
     }
 
@@ -161,12 +191,12 @@ impl LiveProbe {
         self.probe.bytes() + self.drawing.bytes()
     }
 
-    /// Records five passes: what of `surfaces` is seen from a place (metres), its shading by the preview's lights and by probes, levels and
+    /// Records five passes, of a cube fifteen: what of `surfaces` is seen from a place (metres), its shading by the preview's lights and by probes, levels and
     /// borders, and the filter. Probes may be this one itself, as it was before. Afterwards it is visible to compute shaders.
     ///
     /// # Errors
     /// [`Error::Setting`] for a place that is not finite, a preview with other shadow maps or a scene with other features than those that it was made
-    /// for, or probes where it was made for none; [`Error::MissingBarrier`] in debug builds.
+    /// for, or probes where it was made for none or of another map; [`Error::MissingBarrier`] in debug builds.
     pub fn record(
         &self,
         recorder: &mut Recorder,
@@ -186,9 +216,9 @@ impl LiveProbe {
 /// Rows of the catalogue.
 pub(super) const ROWS: &[Row] = &[Row {
     id: "CL-LIVE-MAP",
-    name: "live maps: light at a place drawn each frame as an octahedron, for reflections of objects that move",
+    name: "live maps: light at a place drawn each frame as an octahedron or a cube, for reflections of objects that move",
     role: Role::PartOf("CL-PREVIEW"),
-    limits: "No parallax without a search: a reflection shows what lies in its direction from the map's own place, and a search finds what that place sees.",
+    limits: "No parallax without a search, which is in octahedra: a reflection shows what lies in its direction from the map's own place, and a search finds what that place sees.",
     sources: &[
         sources::BLINN_NEWELL_1976.whole(),
         sources::GREENE_1986.whole(),
@@ -201,6 +231,7 @@ pub(super) const ROWS: &[Row] = &[Row {
         "shaders/techniques/preview/preview_search.comp",
         "shaders/maps/impostor.glsl",
         "shaders/raster/surface_octant.vert",
+        "shaders/raster/surface.vert",
         "shaders/maps/directional_coarser.comp",
         "shaders/maps/directional_border.comp",
         "shaders/maps/prefilter_ggx.comp",
@@ -211,6 +242,7 @@ pub(super) const ROWS: &[Row] = &[Row {
     tests: &[
         "tests/tests/preview/live.rs::irradiance_in_a_closed_room_is_that_of_rays",
         "tests/tests/preview/live.rs::reflections_at_the_middle_are_those_of_rays",
+        "tests/tests/preview/cubes.rs::live_cubes_show_what_octahedra_do",
         "tests/tests/preview/live.rs::deviations_beside_the_middle_are_parallax",
         "tests/tests/preview/moving.rs::objects_are_left_out_of_their_own_maps",
         "tests/tests/preview/search.rs::a_search_takes_parallax_away",

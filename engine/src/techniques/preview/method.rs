@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::drawing::Drawing;
 use super::lights::{LightMap, LightRoom, PreviewShadows};
-use super::probe::{LightProbe, LightProbeDesc};
+use super::probe::{LightProbe, LightProbeDesc, ProbeMap};
 use super::shade::{PreviewPart, Target};
 use crate::Result;
 use crate::gpu::{Gpu, PipelineInfo, Recorder};
@@ -56,6 +56,7 @@ impl PreviewSettings {
     /// What they say of the environment's probe.
     pub fn probe(&self) -> LightProbeDesc {
         LightProbeDesc {
+            map: ProbeMap::Octahedron,
             side: self.probe_side,
             finest: self.probe_finest,
         }
@@ -94,7 +95,14 @@ impl PreviewMethod {
         let probe = environment.map(|environment| LightProbe::of_environment(gpu, settings.probe(), &environment));
         let probe = probe.transpose()?;
         Ok(Self {
-            drawing: Drawing::new(gpu, &scene, size, lights, shadows, probe.is_some())?,
+            drawing: Drawing::new(
+                gpu,
+                &scene,
+                size,
+                lights,
+                shadows,
+                probe.as_ref().map(|probe| probe.desc().map),
+            )?,
             scene,
             settings,
             probe,

@@ -48,7 +48,7 @@ pub use lights::{PreviewLights, PreviewShadows};
 pub use live::LiveProbe;
 pub use method::{PreviewMethod, PreviewSettings};
 pub use planar::{MirrorPlane, PlanarMirror};
-pub use probe::{LightProbe, LightProbeDesc};
+pub use probe::{LightProbe, LightProbeDesc, ProbeMap};
 pub use reflection::{ReflectionMap, ReflectionMapDesc};
 pub use search::SearchedReflections;
 pub use shade::{PARTS_MAX, PreviewPart};
@@ -77,8 +77,8 @@ pub struct PreviewDesc {
     pub lights: u32,
     /// Shadow maps of lights that have a place, and of directional ones as far as they are asked for; `None` for none.
     pub shadows: Option<PreviewShadows>,
-    /// Whether surfaces are lit by probes.
-    pub has_probes: bool,
+    /// Which maps the probes are that surfaces are lit by; `None` where none light them.
+    pub probes: Option<ProbeMap>,
 }
 
 /// Samples along a side of a pixel at most.
@@ -118,7 +118,7 @@ impl Preview {
         Ok(Self {
             gpu: gpu.clone(),
             desc,
-            drawing: Drawing::new(gpu, scene, size, room, desc.shadows, desc.has_probes)?,
+            drawing: Drawing::new(gpu, scene, size, room, desc.shadows, desc.probes)?,
             display: gpu.compute_pipeline(&())?,
             radiance: gpu.buffer(&BufferDesc::storage("preview radiance", bytes, Category::Film))?,
         })
@@ -153,7 +153,7 @@ impl Preview {
     ///
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used, too many parts, a scene with other features than that which the preview was made for, or
-    /// probes where it was made for none;
+    /// probes where it was made for none or for other maps;
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn record(
         &self,

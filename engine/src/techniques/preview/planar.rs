@@ -96,7 +96,7 @@ impl PlanarMirror {
         Ok(Self {
             gpu: gpu.clone(),
             gbuffer,
-            shade: Shade::new(gpu, scene, preview.lights(), false, false)?,
+            shade: Shade::new(gpu, scene, preview.lights(), false, None)?,
             samples,
             radiance: gpu.buffer(&BufferDesc::storage("planar mirror", bytes, Category::Film))?,
         })

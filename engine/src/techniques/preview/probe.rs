@@ -5,8 +5,8 @@
 //! Environment Maps", EGWR 2000; B. Karis, "Real Shading in Unreal Engine 4", SIGGRAPH course notes, 2013 (the integral split into filtered
 //! light and albedo).
 //!
-//! A probe is a square octahedron map in the world's axes. Its look-ups are in levels: the first is the map itself, for mirrors; the last, of 32²
-//! texels, is filtered by the GGX lobe of width α = 1, which with n = v = r is the cosine, so that it is irradiance over π; those between are of
+//! A probe is a square octahedron map in the world's axes, or a cube ([`ProbeMap`]). Its look-ups are in levels: the first is the map itself, for mirrors; the last, of 32²
+//! texels or of six times 16², is filtered by the GGX lobe of width α = 1, which with n = v = r is the cosine, so that it is irradiance over π; those between are of
 //! smaller α, each level half as wide. Finer levels than the finest filtered one, the map itself among them, are plain means by solid angle, and count as the lobe of
 //! their texels' solid angle.
 //! A width between two levels' is the mixture of both whose lobe is nearest to its own ([`probe_part`]).
@@ -31,19 +31,62 @@ use crate::maps::{MapImage, Parametrization};
 use crate::scene::Environment;
 use crate::{Error, Result};
 
-/// Texels along a side of the last level, whose lobe has α = 1.
-pub const LAST_SIDE: u32 = 32;
-/// Least texels along a side of the level that lobes are summed over.
-const LEAST_SOURCE: u32 = 32;
-/// Greatest texels along a side of a level that is filtered.
-const FINEST_MAX: u32 = 256;
+/// Texels along a side of a cube's face over those of an octahedron, of finest filtered levels at most.
+const OF_OCTAHEDRON: u32 = 2;
+
+/// What maps of probes are; both are in the world's axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ProbeMap {
+    /// One square, drawn as eight octants in one pass.
+    #[default]
+    Octahedron,
+    /// Six faces, each drawn in a pass of its own. With half as many texels along a side it has one and a half times as many as an octahedron.
+    Cube,
+}
+
+impl ProbeMap {
+    /// The map's parametrization.
+    pub fn parametrization(self) -> Parametrization {
+        match self {
+            Self::Octahedron => Parametrization::OctahedronQuadratic,
+            Self::Cube => Parametrization::Cube,
+        }
+    }
+
+    /// Texels along a side of the last level, whose lobe has α = 1.
+    pub const fn last_side(self) -> u32 {
+        match self {
+            Self::Octahedron => 32,
+            Self::Cube => 32 / OF_OCTAHEDRON,
+        }
+    }
+
+    /// Greatest texels along a side of a level that is filtered.
+    const fn finest_max(self) -> u32 {
+        match self {
+            Self::Octahedron => 256,
+            Self::Cube => 256 / OF_OCTAHEDRON,
+        }
+    }
+
+    /// A black map in levels; the cube has no borders.
+    pub(super) fn allocate(self, gpu: &Gpu, side: u32, levels: u32) -> Result<DirectionalMap> {
+        let border = match self {
+            Self::Octahedron => 1,
+            Self::Cube => 0,
+        };
+        DirectionalMap::new(gpu, self.parametrization(), UVec2::splat(side), levels, border)
+    }
+}
 
 /// What a [`LightProbe`] is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LightProbeDesc {
-    /// Texels along a side: a power of two from 64 to 4096. With 64 there is no level between mirrors and irradiance.
+    /// Which map.
+    pub map: ProbeMap,
+    /// Texels along a side: a power of two from 64 to 4096, of a cube's faces from 32 to 2048. With the least there is no level between mirrors and irradiance.
     pub side: u32,
-    /// Texels along a side of the finest level that is filtered by a lobe: a power of two from 32 to 256. The work grows with its fourth
+    /// Texels along a side of the finest level that is filtered by a lobe: a power of two from 32 to 256, of a cube's faces from 16 to 128. The work grows with its fourth
     /// power.
     pub finest: u32,
 }
@@ -57,13 +100,14 @@ impl Default for LightProbeDesc {
 impl LightProbeDesc {
     fn check(self) -> Result<()> {
         let is_one_of = |value: u32, low: u32, high: u32| value.is_power_of_two() && (low..=high).contains(&value);
-        let most = LAST_SIDE << (PROBE_LEVELS_MAX - 1);
-        if !is_one_of(self.side, 2 * LAST_SIDE, most) {
-            let cause = format!("is not a power of two from {} to {most}", 2 * LAST_SIDE);
+        let (last, finest) = (self.map.last_side(), self.map.finest_max());
+        let most = last << (PROBE_LEVELS_MAX - 1);
+        if !is_one_of(self.side, 2 * last, most) {
+            let cause = format!("is not a power of two from {} to {most}", 2 * last);
             return Err(Error::setting("probe side", self.side, cause));
         }
-        if !is_one_of(self.finest, LAST_SIDE, FINEST_MAX) {
-            let cause = format!("is not a power of two from {LAST_SIDE} to {FINEST_MAX}");
+        if !is_one_of(self.finest, last, finest) {
+            let cause = format!("is not a power of two from {last} to {finest}");
             return Err(Error::setting("finest filtered level", self.finest, cause));
         }
         Ok(())
@@ -71,7 +115,7 @@ impl LightProbeDesc {
 
     /// Number of levels.
     pub fn levels(self) -> u32 {
-        (self.side / LAST_SIDE).ilog2() + 1
+        (self.side / self.map.last_side()).ilog2() + 1
     }
 
     fn is_filtered(self, level: u32) -> bool {
@@ -84,9 +128,10 @@ impl LightProbeDesc {
             let side = f64::from(self.side >> level);
             if self.is_filtered(level) {
                 // 1, 0.35, 0.125, 0.044: lobes stay wider than the texels of half as fine a level.
-                (f64::from(LAST_SIDE) / side).powf(1.5)
+                (f64::from(self.map.last_side()) / side).powf(1.5)
             } else {
-                alpha_of_solid_angle(4.0 * std::f64::consts::PI / (side * side))
+                let texels = f64::from(self.map.parametrization().layers()) * side * side;
+                alpha_of_solid_angle(4.0 * std::f64::consts::PI / texels)
             }
         };
         (0..self.levels()).map(|level| alpha(level) as f32).collect()
@@ -153,15 +198,7 @@ impl LightProbe {
     /// [`Error::Setting`] for sizes out of range; [`Error::OutOfMemory`].
     pub fn new(gpu: &Gpu, desc: LightProbeDesc) -> Result<Self> {
         desc.check()?;
-        let map = || {
-            DirectionalMap::new(
-                gpu,
-                Parametrization::OctahedronQuadratic,
-                UVec2::splat(desc.side),
-                desc.levels(),
-                1,
-            )
-        };
+        let map = || desc.map.allocate(gpu, desc.side, desc.levels());
         let map_of_light = map()?;
         Ok(Self {
             desc,
@@ -184,7 +221,7 @@ impl LightProbe {
         let from_world = DMat3::from_quat(environment.rotation.as_dquat().inverse());
         let image = resample(
             &source,
-            Parametrization::OctahedronQuadratic,
+            desc.map.parametrization(),
             UVec2::splat(desc.side),
             Parametrization::LatLong.world_axes() * from_world,
             &ResampleSettings {
@@ -239,9 +276,11 @@ impl LightProbe {
     pub fn record(&self, recorder: &mut Recorder) -> Result<()> {
         recorder.pass("probe: levels and borders", |pass| self.map.record_levels(pass))?;
         recorder.pass("probe: copy", |pass| self.record_copy(pass))?;
+        // Least texels along a side of the level that lobes are summed over.
+        let least_source = self.desc.map.last_side();
         recorder.pass("probe: filter", |pass| {
             for level in (0..self.desc.levels()).filter(|level| self.desc.is_filtered(*level)) {
-                let source = (self.desc.side / (self.desc.side >> (level + 1)).max(LEAST_SOURCE)).ilog2();
+                let source = (self.desc.side / (self.desc.side >> (level + 1)).max(least_source)).ilog2();
                 let alpha = self.alphas[level as usize];
                 self.filter
                     .record(pass, (&self.map, source), (&self.filtered, level), alpha)?;
@@ -291,16 +330,22 @@ pub(super) const ROWS: &[Row] = &[Row {
     id: "MET-E1",
     name: "classical environment map: what lies in the ray's own direction",
     role: Role::PartOf("CL-PREVIEW"),
-    limits: "The same from everywhere: right at the map's place and for what is infinitely far; probes are octahedra, and cubes are maps to search in alone.",
+    limits: "The same from everywhere: right at the map's place and for what is infinitely far.",
     sources: &[sources::BLINN_NEWELL_1976.whole(), sources::MILLER_HOFFMAN_1984.whole()],
     shaders: &["shaders/techniques/preview/probe.glsl"],
     bias: Some(Bias::Biased("light is taken to come from infinity")),
     tests: &[
         "tests/tests/preview/light.rs::a_mirror_sphere_shows_the_environment",
+        "tests/tests/preview/cubes.rs::cubes_light_surfaces_as_their_skies_do",
+        "tests/tests/preview/cubes.rs::rough_reflections_by_cubes_are_those_by_octahedra",
+        "tests/tests/preview/cubes.rs::maps_that_do_not_fit_are_refused",
         "engine/src/maps/impostor/tests/edges.rs::the_classical_look_up_is_the_same_everywhere",
         "engine/src/maps/impostor/tests/searches.rs::convex_rooms_give_the_published_errors",
     ],
-    api: &["clerestory::techniques::preview::LightProbe"],
+    api: &[
+        "clerestory::techniques::preview::LightProbe",
+        "clerestory::techniques::preview::ProbeMap",
+    ],
     ..Row::of(file!())
 }];
 
@@ -313,30 +358,51 @@ mod tests {
 
     #[test]
     fn lobes_grow_from_level_to_level() {
+        let both = |side: u32, finest: u32| {
+            let cube = LightProbeDesc {
+                map: ProbeMap::Cube,
+                side: side / OF_OCTAHEDRON,
+                finest: finest / OF_OCTAHEDRON,
+            };
+            let map = ProbeMap::Octahedron;
+            [LightProbeDesc { map, side, finest }, cube]
+        };
         for (side, finest) in [(64, 32), (128, 64), (256, 64), (512, 128), (4096, 256)] {
-            let desc = LightProbeDesc { side, finest };
-            let alphas = desc.alphas();
-            assert_eq!(alphas.len() as u32, desc.levels());
-            assert!(
-                alphas.windows(2).all(|pair| pair[0] < pair[1]),
-                "{side}, {finest}: {alphas:?}"
-            );
-            assert!(
-                alphas[0] > 0.0 && alphas[0] < 1.0 / side as f32,
-                "{side}: {}",
-                alphas[0]
-            );
-            assert_eq!(alphas.last(), Some(&1.0));
+            for desc in both(side, finest) {
+                let alphas = desc.alphas();
+                assert!(desc.check().is_ok(), "{desc:?}");
+                assert_eq!(alphas.len() as u32, desc.levels());
+                assert!(alphas.windows(2).all(|pair| pair[0] < pair[1]), "{desc:?}: {alphas:?}");
+                assert!(
+                    alphas[0] > 0.0 && alphas[0] < 1.0 / side as f32,
+                    "{desc:?}: {}",
+                    alphas[0]
+                );
+                assert_eq!(alphas.last(), Some(&1.0));
+            }
+            // Halves of the sides give the same filtered lobes.
+            let [octahedron, cube] = both(side, finest);
+            let levels = 0..octahedron.levels();
+            for level in levels.filter(|level| octahedron.is_filtered(*level)) {
+                let [a, b] = [octahedron, cube].map(|desc| desc.alphas()[level as usize]);
+                assert!(cube.is_filtered(level) && a == b, "{side}, {finest}: {a} {b}");
+            }
         }
-        for desc in [(32, 32), (100, 64), (8192, 64), (128, 16), (128, 512)] {
-            let (side, finest) = desc;
-            assert!(LightProbeDesc { side, finest }.check().is_err(), "{desc:?}");
+        for (side, finest) in [(32, 32), (100, 64), (8192, 64), (128, 16), (128, 512)] {
+            for desc in both(side, finest) {
+                assert!(desc.check().is_err(), "{desc:?}");
+            }
         }
     }
 
     #[test]
     fn levels_of_lobes_are_those_of_their_widths() {
-        let alphas = LightProbeDesc { side: 512, finest: 128 }.alphas();
+        let alphas = LightProbeDesc {
+            map: ProbeMap::Octahedron,
+            side: 512,
+            finest: 128,
+        }
+        .alphas();
         for (level, alpha) in alphas.iter().enumerate() {
             assert!((probe_level(&alphas, f64::from(*alpha)) - level as f64).abs() < 1e-12);
         }
@@ -382,7 +448,12 @@ mod tests {
 
     #[test]
     fn mixtures_are_near_the_lobe() {
-        let alphas = LightProbeDesc { side: 512, finest: 256 }.alphas();
+        let alphas = LightProbeDesc {
+            map: ProbeMap::Octahedron,
+            side: 512,
+            finest: 256,
+        }
+        .alphas();
         let mut worst = 0.0f64;
         for pair in alphas[1..].windows(2) {
             let [a, b] = [f64::from(pair[0]), f64::from(pair[1])];

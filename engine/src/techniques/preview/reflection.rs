@@ -18,7 +18,7 @@ use glam::{UVec2, Vec3};
 
 use super::Preview;
 use super::live::LiveDrawing;
-use super::probe::LightProbe;
+use super::probe::{LightProbe, ProbeMap};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::{Access, Gpu, Recorder};
 use crate::maps::Parametrization;
@@ -85,7 +85,7 @@ pub struct ReflectionMap {
 }
 
 impl ReflectionMap {
-    /// Allocates a map and what draws it; its surfaces are lit as those of the preview, and by probes where `has_probes` says so.
+    /// Allocates a map and what draws it; its surfaces are lit as those of the preview, and by probes that are octahedra where `has_probes` says so.
     ///
     /// # Errors
     /// [`Error::Setting`] for sizes out of range; [`Error::LimitExceeded`] for a map with its border wider than 4096 texels or beyond what buffers
@@ -124,7 +124,13 @@ impl ReflectionMap {
         let table = SphericalSat::new(gpu, of, SatNumbers::TwoFloat, range)?;
         Ok(Self {
             desc,
-            drawing: LiveDrawing::new(gpu, scene, preview.lights(), (desc.side, &[]), has_probes)?,
+            drawing: LiveDrawing::new(
+                gpu,
+                scene,
+                preview.lights(),
+                (ProbeMap::Octahedron, desc.side, &[]),
+                has_probes.then_some(ProbeMap::Octahedron),
+            )?,
             octahedron,
             lat_long,
             table,

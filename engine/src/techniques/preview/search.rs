@@ -74,7 +74,7 @@ impl SearchedReflections {
     /// [`PreviewPart`], mirror what a search in its distances finds; from others it would take away light that was never added. `place` is where the probe was drawn, metres.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a camera that cannot be used, a place that is not finite, a probe without distances ([`LiveProbe::with_distances`]), a preview without probes ([`PreviewDesc::has_probes`](super::PreviewDesc::has_probes)), and a scene with other features than those that it was made for;
+    /// [`Error::Setting`] for a camera that cannot be used, a place that is not finite, a probe without distances ([`LiveProbe::with_distances`]), a preview without probes ([`PreviewDesc::probes`](super::PreviewDesc::probes)), and a scene with other features than those that it was made for;
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn record(
         &self,
@@ -92,9 +92,9 @@ impl SearchedReflections {
             let cause = "has other features than that which the search was made for";
             return Err(Error::setting("scene or probe", "given", cause));
         }
-        if !preview.desc().has_probes {
+        if preview.desc().probes.is_none() {
             let cause =
-                "lights nothing by probes, and a search is for what they have shown; PreviewDesc::has_probes is needed";
+                "lights nothing by probes, and a search is for what they have shown; PreviewDesc::probes is needed";
             return Err(Error::setting("preview", "given", cause));
         }
         let (seen_from, around) = (&preview.drawing.gbuffer, live.gbuffer());

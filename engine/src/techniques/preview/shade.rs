@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::lights::PreviewLights;
-use super::probe::LightProbe;
+use super::probe::{LightProbe, ProbeMap};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::SampledView;
 use crate::gpu::shaders::constants::PROBE_LEVELS_MAX;
@@ -14,6 +14,7 @@ use crate::gpu::shaders::types::PreviewFrame;
 use crate::gpu::{
     Access, Buffer, BufferBarrier, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Sampler, SamplerDesc,
 };
+use crate::maps::cube::cube_axes;
 use crate::maps::directional_map::DirectionalMap;
 use crate::raster::{GBuffer, Output, ViewShadowMaps};
 use crate::scene::camera_frame::CameraFrame;
@@ -41,6 +42,8 @@ pub struct PreviewPart<'a> {
 pub(in crate::techniques) enum Eye<'a> {
     Camera(&'a CameraFrame),
     AllDirections(Vec3),
+    /// A place, through a face of a cube about it.
+    CubeFace(Vec3, u32),
 }
 
 /// Where radiance goes.
@@ -74,21 +77,16 @@ pub(in crate::techniques) struct Shade {
 }
 
 impl Shade {
+    /// `probes` says which maps light surfaces, if any do.
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
         lights: &PreviewLights,
         all_directions: bool,
-        has_probe: bool,
+        probes: Option<ProbeMap>,
     ) -> Result<Self> {
-        let dark = DirectionalMap::new(
-            gpu,
-            crate::maps::Parametrization::OctahedronQuadratic,
-            glam::UVec2::splat(2),
-            1,
-            1,
-        )?;
-        let spec = spec(scene, lights, &dark, all_directions, has_probe);
+        let dark = probes.unwrap_or_default().allocate(gpu, 2, 1)?;
+        let spec = spec(scene, lights, &dark, all_directions, probes.is_some());
         let bytes = (PARTS_MAX * size_of::<PreviewFrame>()) as u64;
         Ok(Self {
             pipeline: gpu.compute_pipeline(&spec)?,
@@ -137,7 +135,8 @@ impl Shade {
             let cause = format!("are more than {PARTS_MAX}");
             return Err(Error::setting("parts", parts.len(), cause));
         }
-        if !self.spec.has_probe && parts.iter().any(|part| part.probe.is_some()) {
+        let is_known = |probe: &LightProbe| self.spec.has_probe && probe.map().map() == self.dark.map();
+        if !parts.iter().filter_map(|part| part.probe).all(is_known) {
             return Err(Error::setting(
                 "probe",
                 "given",
@@ -276,6 +275,10 @@ pub(super) fn frame(seen: &Seen<'_>, part: &PreviewPart<'_>) -> PreviewFrame {
             frame.is_parallel = camera.orthographic.into();
         }
         Eye::AllDirections(origin) => frame.origin = origin.to_array(),
+        Eye::CubeFace(origin, face) => {
+            frame.origin = origin.to_array();
+            [frame.right, frame.down, frame.forward] = cube_axes(*face).map(|axis| axis.as_vec3().to_array());
+        }
     }
     frame
 }

@@ -341,7 +341,8 @@ mod tests {
         (0..=SAMPLES).map(error).fold(0.0, f64::max)
     }
 
-    /// At 700 (copper: 670), 550 and 435 nm, with the indices of Hagemann et al.; the thesis prints about 2, 6, 5 and 18 % for the worst of each. What was
+    /// At 700 (copper: 670), 550 and 435 nm, with the indices of Hagemann et al.; a doctoral thesis on metals and reflections on graphics hardware prints about 2, 6, 5 and 18 % for
+    /// the worst of each. What was
     /// published for gold at 435 nm, 8.60 %, is of n = 1.859; the table has 1.885 there.
     #[test]
     fn hagemanns_metals_give_the_published_headline() {

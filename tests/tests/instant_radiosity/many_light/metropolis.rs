@@ -25,14 +25,15 @@ fn chosen_lights_bring_all_that_the_pool_brings() {
                     bound_value: 1.0,
                     ..chains()
                 };
+                let mutations = settings.mutations;
                 let mut renderer = frames(gpu, &scene, SIZE, &of(INDIRECT, settings));
                 renderer.restart(frame).expect("a seed");
                 let radiance = advance(&mut renderer, 1)[0].clone();
                 let counts = renderer.counts();
                 assert_eq!(counts.lights, u64::from(lights));
-                // Seeds; steps of four for a light, of four tries and three references; the pixels that measure lights.
+                // Seeds; steps of chains, of four tries and three references; the pixels that measure lights.
                 let at_once = lights.min(64);
-                let steps = 4 * u64::from(lights.div_ceil(at_once) * at_once);
+                let steps = u64::from(mutations * lights.div_ceil(at_once) * at_once);
                 let rays = 16_384 + 7 * steps + u64::from(lights * 4096);
                 assert_eq!(counts.chain_rays, rays);
                 let luminance = [0.2126, 0.7152, 0.0722];

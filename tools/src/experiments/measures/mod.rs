@@ -172,6 +172,7 @@ measures! {
     on_device "photon-statistics" photons::photon_statistics;
     on_host "picture-formats" rendering::picture_formats;
     on_device "planar-mirrors" preview::planar_mirrors;
+    on_device "previous-reflections" impostors::previous_reflections;
     on_host "random-numbers" photons::random_numbers;
     on_device "ray-engine" rays::ray_engine;
     on_host "ray-offsets" rays::ray_offsets;

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::super::places::{blended_maps, nearest_map};
 use super::super::proxy::{box_proxy, hemisphere_proxy, mirrored, refracted, sphere_proxy};
+use super::super::published::{BY_PROXIES, PROXY_RADII};
 use super::*;
 
 /// Mean error of directions to a proxy, and the largest.
@@ -26,11 +27,8 @@ fn a_box_is_exact_in_its_room() {
 
 #[test]
 fn spheres_err_as_published() {
-    for (sphere, published) in [
-        (ShinySphere::B, [2.51, 1.24, 2.43]),
-        (ShinySphere::C, [6.90, 3.43, 7.21]),
-    ] {
-        for (radius, published) in [1.0, 1.2, 1.5].into_iter().zip(published) {
+    for (sphere, published) in BY_PROXIES {
+        for (radius, published) in PROXY_RADII.into_iter().zip(published) {
             let [mean, _] = by(&sphere, |x, r| sphere_proxy(x, r, radius));
             near(&format!("{}, radius {radius}", sphere.name), mean, published);
         }

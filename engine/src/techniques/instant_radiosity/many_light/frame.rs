@@ -1,27 +1,27 @@
 //! Frames of many lights, submission by submission.
 
+mod gathers;
+mod lights;
+mod picture;
+
 use std::ops::Range;
 
 use glam::{DVec2, UVec4};
 
 use super::interleave::Interleaving;
 use super::kernels::{Seen, SharedLights, Sight, seen_from};
-use super::maps::Maps;
 use super::metropolis::{Chains, Metropolis};
-use super::past::Past;
 use super::reflective::{LightView, Reflective};
 use super::renderer::{Indirect, LightSource, ManyLight};
-use super::reservoirs::Reservoirs;
+use crate::Result;
 use crate::gpu::shaders::types::SeenFrom;
-use crate::gpu::{Access, Area, Pass, Recorder, Timings};
+use crate::gpu::{Area, Recorder, Timings};
 use crate::raster::{DrawPart, View};
 use crate::scene::camera_frame::CameraFrame;
-use crate::techniques::instant_radiosity::gather::SWEEPS_A_LIGHT;
 use crate::techniques::photon_mapping::Tracing;
 use crate::transport::GpuScene;
 use crate::transport::random::{Sampler, SamplerKind, pcg4d, sample_2d};
 use crate::transport::warp::square_to_disk;
-use crate::{Error, Result};
 
 /// Tells the number that chooses the first tile's part of the lights from others.
 const FIRST_SUBSET_SEED: u32 = 0x7475_726e;
@@ -200,37 +200,6 @@ impl ManyLight {
         Ok(vec![recorder.submit()?.wait()?])
     }
 
-    fn walk(&mut self, frame: &mut Frame, mut tracing: Box<Tracing>) -> Result<(Vec<Timings>, Stage)> {
-        let source = self.indirect.as_mut().map(|indirect| &mut indirect.source);
-        let Some(tracer) = source.and_then(LightSource::tracer) else {
-            return Ok((Vec::new(), self.first_drawing()));
-        };
-        let all = tracer.advance(&mut tracing)?;
-        let timings = tracing.take_timings();
-        if !all {
-            return Ok((timings, Stage::Walks(tracing)));
-        }
-        let traced = tracing.into_traced();
-        self.counts.walks += traced.counts;
-        if self.metropolis().is_some() && traced.records > 0 {
-            frame.chains = Some(Box::new(Chains::new(self.number(), self.film.size(), traced.records)));
-            return Ok((timings, self.first_drawing()));
-        }
-        Ok((timings, self.placed(frame, traced.records)?))
-    }
-
-    fn keep(&mut self, frame: &mut Frame) -> Result<(Vec<Timings>, Stage)> {
-        let Some(LightSource::Kept(kept)) = self.indirect.as_mut().map(|indirect| &mut indirect.source) else {
-            return Ok((Vec::new(), self.first_drawing()));
-        };
-        let done = kept.keep(&self.gpu, &self.scene)?;
-        let lights = kept.count();
-        self.counts.passes += done.passes;
-        self.counts.renewed += done.renewed;
-        self.counts.sight_rays += done.rays;
-        Ok((done.timings, self.placed(frame, lights)?))
-    }
-
     /// What comes behind the virtual lights of a frame.
     fn placed(&mut self, frame: &mut Frame, lights: u32) -> Result<Stage> {
         (frame.lights, self.placed) = (lights, lights);
@@ -258,33 +227,6 @@ impl ManyLight {
         }
     }
 
-    /// A submission of the chains of a frame, and behind the last one the split picture.
-    fn choose(&mut self, frame: &mut Frame) -> Result<(Vec<Timings>, Stage)> {
-        let Some(mut chains) = frame.chains.take() else {
-            return Ok((Vec::new(), self.after_drawing(frame)));
-        };
-        let mut rays = 0;
-        let timings = self.submit(|own, recorder| {
-            let (Some(metropolis), Some(seen)) = (own.metropolis(), &own.seen) else {
-                return Ok(());
-            };
-            let sight = frame.sight(&own.scene, seen);
-            rays = metropolis.record(recorder, &sight, &chains, frame.is_shown)?;
-            Ok(())
-        })?;
-        frame.is_shown = true;
-        self.counts.chain_rays += rays;
-        if let Some(metropolis) = self.metropolis() {
-            metropolis.learn(&self.gpu, &mut chains)?;
-        }
-        let Some(lights) = chains.ended() else {
-            frame.chains = Some(chains);
-            return Ok((timings, Stage::Chains));
-        };
-        self.placed(frame, lights)?;
-        Ok((timings, self.after_drawing(frame)))
-    }
-
     /// What comes behind what is seen.
     fn after_drawing(&self, frame: &Frame) -> Stage {
         match (&self.direct, &frame.chains) {
@@ -300,76 +242,6 @@ impl ManyLight {
             Some(LightSource::Reflective(reflective)) => Some(reflective),
             _ => self.discs.as_ref().map(|discs| &discs.reflective),
         }
-    }
-
-    /// What the maps of a frame are drawn from, and the views of that.
-    fn emit(&mut self) -> Result<(Vec<Timings>, Stage)> {
-        let number = self.number();
-        let timings = self.submit(|own, recorder| match own.reflective() {
-            Some(reflective) => reflective.record_emitters(recorder, &own.scene, number),
-            None => Ok(()),
-        })?;
-        let Some(reflective) = self.reflective() else {
-            return Ok((timings, self.first_drawing()));
-        };
-        let all = reflective.views(&self.gpu, &self.scene.surfaces())?;
-        self.counts.views += all.len() as u64;
-        self.viewed = 0;
-        let views = LightViews {
-            all,
-            next: 0,
-            parts: Vec::new(),
-            part: 0,
-        };
-        Ok((timings, Stage::View(Box::new(views))))
-    }
-
-    /// A part of a view of a light.
-    fn draw_view(&mut self, mut views: LightViews) -> Result<(Vec<Timings>, Stage)> {
-        let (Some(reflective), Some(view)) = (self.reflective(), views.all.get(views.next).copied()) else {
-            return Ok((Vec::new(), Stage::OnViews(views.all.len() as u32)));
-        };
-        if views.parts.is_empty() {
-            let (surfaces, size) = (self.scene.surfaces(), [reflective.side(); 2]);
-            views.parts = reflective.coverage().parts(&surfaces, &[view.view], size)?;
-        }
-        let (number, part) = (views.next as u32, views.parts[views.part].clone());
-        let timings = self.submit(|own, recorder| match own.reflective() {
-            Some(reflective) => reflective.record_view(recorder, &own.scene, (number, &view), &part),
-            None => Ok(()),
-        })?;
-        views.part += 1;
-        if part.ends {
-            (views.next, views.part) = (views.next + 1, 0);
-            views.parts.clear();
-        }
-        Ok((timings, Stage::View(Box::new(views))))
-    }
-
-    /// Virtual lights on the views of a frame: none where those are black.
-    fn place_on_views(&mut self, frame: &mut Frame, views: u32) -> Result<(Vec<Timings>, Stage)> {
-        self.viewed = views;
-        if self.discs.is_some() {
-            frame.views = views;
-            return Ok((Vec::new(), self.first_drawing()));
-        }
-        if views == 0 {
-            return Ok((Vec::new(), self.placed(frame, 0)?));
-        }
-        let number = self.number();
-        let timings = self.submit(|own, recorder| match own.reflective() {
-            Some(reflective) => reflective.record_lights(recorder, &own.scene, views, number),
-            None => Ok(()),
-        })?;
-        let Some(reflective) = self.reflective() else {
-            return Ok((timings, self.first_drawing()));
-        };
-        let lights = if reflective.total(&self.gpu)? > 0.0 {
-            reflective.lights()
-        } else {
-            0
-        };
-        Ok((timings, self.placed(frame, lights)?))
     }
 
     /// A part of what is seen, and behind the last one the split picture where there are lights.
@@ -406,141 +278,6 @@ impl ManyLight {
             Stage::Draw(part + 1)
         };
         Ok((timings, next))
-    }
-
-    fn shade(&mut self, frame: &mut Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
-        let (all, number) = (self.pixels(), self.done);
-        let at_once = self.direct.as_ref().map_or(all, |direct| direct.pixels);
-        let end = first.saturating_add(at_once).min(all);
-        let timings = self.submit(|own, recorder| {
-            let (Some(direct), Some(seen)) = (&own.direct, &own.seen) else {
-                return Ok(());
-            };
-            recorder.pass("many-light: direct", |pass| {
-                if !frame.is_shown {
-                    seen.show(pass);
-                }
-                let sight = frame.sight(&own.scene, seen);
-                direct.record(pass, &sight, number, first..end, &own.radiance)?;
-                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
-                Ok(())
-            })
-        })?;
-        frame.is_shown = true;
-        let next = if end < all {
-            Stage::Direct(end)
-        } else {
-            self.first_lights(frame, 0)
-        };
-        Ok((timings, next))
-    }
-
-    /// What the texels of a view bring to a part of the pixels.
-    fn gather_discs(&mut self, frame: &mut Frame, view: u32, first: u32) -> Result<(Vec<Timings>, Stage)> {
-        let (all, number) = (self.pixels(), self.done);
-        let at_once = self.discs.as_ref().map_or(all, |discs| discs.pixels);
-        let end = first.saturating_add(at_once).min(all);
-        let timings = self.submit(|own, recorder| {
-            let (Some(discs), Some(seen)) = (&own.discs, &own.seen) else {
-                return Ok(());
-            };
-            recorder.pass("many-light: discs", |pass| {
-                if !frame.is_shown {
-                    seen.show(pass);
-                }
-                // What the first view brings is added to direct light, or to nothing.
-                if view == 0 && first == 0 {
-                    own.record_black(pass)?;
-                }
-                let sight = frame.sight(&own.scene, seen);
-                discs.record(pass, &sight, (number, view), first..end, &own.radiance)
-            })
-        })?;
-        frame.is_shown = true;
-        let next = match (end < all, view + 1 < frame.views) {
-            (true, _) => Stage::Discs { view, pixel: end },
-            (false, true) => Stage::Discs {
-                view: view + 1,
-                pixel: 0,
-            },
-            (false, false) => Stage::Merge(0),
-        };
-        Ok((timings, next))
-    }
-
-    /// Where there is no direct light, nothing yet.
-    fn record_black(&self, pass: &mut Pass<'_>) -> Result<()> {
-        if self.direct.is_none() {
-            pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_WRITE);
-            pass.fill(self.radiance.view(), 0)?;
-            pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
-        }
-        Ok(())
-    }
-
-    /// Where the lights of reservoirs come from, these, and what is seen.
-    fn with_reservoirs(&self) -> Option<(&LightSource, &Reservoirs, &Seen)> {
-        let indirect = self.indirect.as_ref()?;
-        Some((&indirect.source, indirect.reservoirs()?, self.seen.as_ref()?))
-    }
-
-    /// Lights that a part of the pixels draw.
-    fn resample(&mut self, frame: &mut Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
-        let Some(reservoirs) = self.indirect.as_ref().and_then(Indirect::reservoirs) else {
-            return Ok((Vec::new(), Stage::Merge(0)));
-        };
-        let (all, number) = (self.pixels(), self.done);
-        let end = first.saturating_add(reservoirs.pixels[0]).min(all);
-        let timings = self.submit(|own, recorder| {
-            let Some((source, reservoirs, seen)) = own.with_reservoirs() else {
-                return Ok(());
-            };
-            recorder.pass("many-light: resample", |pass| {
-                if !frame.is_shown {
-                    seen.show(pass);
-                }
-                let sight = frame.sight(&own.scene, seen);
-                let lights = (source.records(), frame.lights);
-                reservoirs.record_resample(pass, &sight, lights, number, first..end)
-            })
-        })?;
-        frame.is_shown = true;
-        let next = if end < all {
-            Stage::Resample(end)
-        } else {
-            Stage::Reuse(0)
-        };
-        Ok((timings, next))
-    }
-
-    /// Light of what a part of the pixels and their neighbours keep.
-    fn reuse(&mut self, frame: &Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
-        let Some(reservoirs) = self.indirect.as_ref().and_then(Indirect::reservoirs) else {
-            return Ok((Vec::new(), Stage::Merge(0)));
-        };
-        let (all, number) = (self.pixels(), self.done);
-        let end = first.saturating_add(reservoirs.pixels[1]).min(all);
-        let timings = self.submit(|own, recorder| {
-            let Some((source, reservoirs, seen)) = own.with_reservoirs() else {
-                return Ok(());
-            };
-            recorder.pass("many-light: reuse", |pass| {
-                if first == 0 {
-                    own.record_black(pass)?;
-                }
-                let sight = frame.sight(&own.scene, seen);
-                reservoirs.record_reuse(pass, &sight, source.records(), number, first..end, &own.radiance)
-            })
-        })?;
-        if end < all {
-            return Ok((timings, Stage::Reuse(end)));
-        }
-        if let Some(reservoirs) = self.indirect.as_ref().and_then(Indirect::reservoirs) {
-            let [connections, tests] = reservoirs.counts()?;
-            self.counts.connections += connections;
-            self.counts.visibility_tests += tests;
-        }
-        Ok((timings, Stage::Merge(0)))
     }
 
     /// What gathers the lights from one on: as many as have a map at the same time, or all.
@@ -590,179 +327,5 @@ impl ManyLight {
             LightSource::Kept(kept) if maps.as_ref()?.at_once() >= frame.lights => kept.unmapped(lights.start),
             _ => Some(lights).filter(|lights| !lights.is_empty()),
         }
-    }
-
-    fn draw_maps(&mut self, frame: &mut Frame, first: u32, [light, part]: [u32; 2]) -> Result<(Vec<Timings>, Stage)> {
-        let at_once = self.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
-        let all = (first + at_once.map_or(0, Maps::at_once)).min(frame.lights);
-        let lights = self.to_draw(frame, light..all);
-        let maps = self.indirect.as_mut().and_then(|indirect| indirect.maps.as_mut());
-        let gather = Stage::Gather {
-            lights: first..all,
-            place: 0,
-            sweeps: 0,
-        };
-        let (Some(lights), Some(maps)) = (lights, maps) else {
-            return Ok((Vec::new(), gather));
-        };
-        let from = [lights.start, if lights.start == light { part } else { 0 }];
-        let points = u64::from(maps.points());
-        let (drawing, next) = maps.plan(&self.scene.surfaces(), from, lights.end)?;
-        let begins = !std::mem::replace(&mut frame.has_maps, true);
-        let timings = self.submit(|own, recorder| {
-            let maps = own.indirect.as_ref().and_then(|indirect| indirect.maps.as_ref());
-            let surfaces = own.scene.surfaces();
-            let Some((indirect, maps)) = own.indirect.as_ref().zip(maps) else {
-                return Ok(());
-            };
-            let lights = (indirect.source.records(), frame.lights);
-            maps.record(recorder, &surfaces, lights, begins, first, &drawing)
-        })?;
-        let drawn = u64::from(next[0] - from[0]);
-        self.counts.maps += drawn;
-        self.counts.splats += drawn * points;
-        if let Some(LightSource::Kept(kept)) = self.indirect.as_mut().map(|indirect| &mut indirect.source) {
-            kept.have_maps(from[0]..next[0]);
-        }
-        let next = if next[0] < all {
-            Stage::Maps { first, from: next }
-        } else {
-            gather
-        };
-        Ok((timings, next))
-    }
-
-    fn gather(&mut self, frame: &Frame, lights: Range<u32>, place: u32, sweeps: u64) -> Result<(Vec<Timings>, Stage)> {
-        let Some(split) = self.indirect.as_ref().and_then(Indirect::split) else {
-            return Ok((Vec::new(), Stage::Merge(0)));
-        };
-        let all = split.interleaving.places() as u32;
-        let end = place.saturating_add(split.places_at_once).min(all);
-        // Those that a subset has, at most, as many a submission as are a bounded piece of work.
-        let of_subset = frame.lights.div_ceil(split.subsets).min(lights.end - lights.start);
-        let work = u64::from(end - place) * u64::from(split.lights_at_once);
-        let wanted = u64::from(of_subset.div_ceil(split.lights_at_once)).saturating_sub(sweeps);
-        let count = (split.connections / work.max(1)).clamp(1, wanted.max(1)) as u32;
-        let shared = self.shared(frame.lights);
-        let timings = self.submit(|own, recorder| {
-            let Some((indirect, split)) = own.indirect.as_ref().and_then(|own| Some((own, own.split()?))) else {
-                return Ok(());
-            };
-            let maps = indirect.maps.as_ref();
-            let records = indirect.source.records();
-            recorder.pass("many-light: gather", |pass| {
-                split.record_sweeps(
-                    pass,
-                    &own.scene,
-                    frame.from,
-                    (records, shared),
-                    (maps, lights.clone()),
-                    (place..end, count),
-                )
-            })
-        })?;
-        let Some(split) = self.indirect.as_ref().and_then(Indirect::split) else {
-            return Ok((timings, Stage::Merge(0)));
-        };
-        let swept = split.swept()?;
-        self.counts.connections += swept.connections;
-        self.counts.visibility_tests += swept.tests;
-        let sweeps = sweeps + u64::from(count);
-        let most = u64::from(frame.lights) * SWEEPS_A_LIGHT;
-        if swept.remaining > 0 && sweeps > most {
-            return Err(Error::Overflow {
-                kernel: "deferred_gather".into(),
-                what: "sweeps over the virtual lights".into(),
-                needed: sweeps,
-                capacity: most,
-                instead: "choose another ray index".into(),
-            });
-        }
-        let next = match (swept.remaining > 0, end < all) {
-            (true, _) => Stage::Gather { lights, place, sweeps },
-            (false, true) => Stage::Gather {
-                lights,
-                place: end,
-                sweeps: 0,
-            },
-            (false, false) => self.first_lights(frame, lights.end),
-        };
-        Ok((timings, next))
-    }
-
-    fn merge(&mut self, frame: &Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
-        let all = self.pixels();
-        let gathered = frame.lights > 0;
-        let at_once = self.indirect.as_ref().filter(|_| gathered).and_then(Indirect::split);
-        let at_once = at_once.map_or(all, |split| split.pixels);
-        let end = first.saturating_add(at_once).min(all);
-        let blends = gathered && self.past().is_some();
-        let shared = self.shared(frame.lights);
-        let timings = self.submit(|own, recorder| {
-            let split = own.indirect.as_ref().filter(|_| gathered).and_then(Indirect::split);
-            if let (Some(split), Some(seen)) = (split, &own.seen) {
-                let target = own.past().map_or(&own.radiance, Past::light);
-                recorder.pass("many-light: merge", |pass| {
-                    split.record_merge(pass, seen, shared, first..end, target)?;
-                    if blends {
-                        pass.memory_barrier(Access::COMPUTE, Access::COMPUTE);
-                    }
-                    Ok(())
-                })?;
-            } else if own.direct.is_none() && frame.views == 0 && !gathered {
-                recorder.pass("many-light: black", |pass| {
-                    pass.fill(own.radiance.view(), 0)?;
-                    pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
-                    Ok(())
-                })?;
-            }
-            if end < all || blends {
-                return Ok(());
-            }
-            own.film.record_frame(recorder, &own.radiance)
-        })?;
-        let next = match (end < all, blends) {
-            (true, _) => Stage::Merge(end),
-            (false, true) => Stage::Blend(0),
-            (false, false) => {
-                // Light that is gone is gone at once.
-                let past = self.indirect.iter_mut().filter_map(|indirect| indirect.past.as_mut());
-                past.for_each(Past::forget);
-                Stage::Ended
-            }
-        };
-        Ok((timings, next))
-    }
-
-    /// Indirect light of a part of the pixels with that of the frame before, to the picture.
-    fn blend(&mut self, frame: &Frame, first: u32) -> Result<(Vec<Timings>, Stage)> {
-        let all = self.pixels();
-        let at_once = self.past().map_or(all, |past| past.pixels);
-        let end = first.saturating_add(at_once).min(all);
-        let timings = self.submit(|own, recorder| {
-            let (Some(indirect), Some(seen)) = (&own.indirect, &own.seen) else {
-                return Ok(());
-            };
-            let (Some(past), Some(split)) = (&indirect.past, indirect.split()) else {
-                return Ok(());
-            };
-            recorder.pass("many-light: blend", |pass| {
-                let colors = split.colors();
-                past.record(pass, seen, frame.from, colors, first..end, &own.radiance)?;
-                pass.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
-                Ok(())
-            })?;
-            if end < all {
-                return Ok(());
-            }
-            own.film.record_frame(recorder, &own.radiance)
-        })?;
-        if end < all {
-            return Ok((timings, Stage::Blend(end)));
-        }
-        if let Some(past) = self.indirect.as_mut().and_then(|indirect| indirect.past.as_mut()) {
-            past.keep(frame.from);
-        }
-        Ok((timings, Stage::Ended))
     }
 }

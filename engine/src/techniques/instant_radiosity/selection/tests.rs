@@ -1,4 +1,4 @@
-//! Orders by themselves, and in the unit box the shares, rays and errors that the digest found there.
+//! Orders by themselves, and in the unit box the shares, rays and errors that were found there independently of the engine.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -10,10 +10,10 @@ use crate::test_random::Random;
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::environment::luminance;
 
-/// Walks of the digest's figures, and its bound of distances, m.
+/// Walks of those figures, and their bound of distances, m.
 const WALKS: u32 = 20;
 const BOUND: EdgeBound = EdgeBound::Distance(0.01);
-/// Points of the picture: the digest's view of 96 by 60, every second of them both ways.
+/// Points of the picture: their view of 96 by 60, every second of them both ways.
 const SIZE: [u32; 2] = [48, 30];
 /// How far from surfaces rays begin, m.
 const OFFSET: f64 = 1e-6;
@@ -171,7 +171,7 @@ struct Found {
 
 const EVERY: Resorting = Resorting::Period(1);
 
-/// The figures of the digest, §9.8, of other walks in the same box; means over three seeds, within its spread over its three seeds and as much again.
+/// Figures of other walks in the same box, computed independently of the engine; means over three seeds, within the spread of those over three seeds and as much again.
 #[test]
 fn a_share_of_the_potential_needs_the_published_share_of_lights_and_rays() {
     let scene = UnitBox::new();
@@ -256,7 +256,7 @@ fn orders_that_are_kept_cost_the_published_rays() {
     for pair in found.windows(2) {
         assert!(pair[1].rays > pair[0].rays && pair[1].error < 1.05 * pair[0].error);
     }
-    // Of the digest 52.2 at every point and 56.2 at every fifth, of points half as far apart.
+    // Of those figures 52.2 at every point and 56.2 at every fifth, of points half as far apart.
     let more = found[2].rays / found[0].rays;
     assert!((1.03..1.2).contains(&more), "{more}");
     for limit in [0.05, 0.1, 0.2, 0.3] {

@@ -22,7 +22,7 @@ use crate::gpu::{
 };
 use crate::techniques::photon_mapping::gather::{GatherCounts, RayFetches};
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
-use crate::techniques::photon_mapping::queue::{AskSpec, Queue};
+use crate::techniques::photon_mapping::queue::{AskSpec, Queue, QueueMemory};
 use crate::techniques::photon_mapping::settings::{MapQuery, PhotonSettings};
 use crate::transport::{GpuScene, PathSet};
 use crate::walk::{Places, WalkKey, default_slots, stage_barrier};
@@ -62,6 +62,8 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     states: u32,
     volume_states: u32,
     bounces: [u32; 2],
+    /// Of a pass.
+    photons: u32,
     /// [`PathClasses::asks`].
     classes: [u32; ASKING_STATES],
 }
@@ -88,10 +90,12 @@ pub(in crate::techniques::photon_mapping) struct BeamAsk<'a> {
     pub surface_states: u32,
     /// The path set bounds the number of scatterings.
     pub counts_bounces: bool,
+    /// States of eye paths from which on maps are asked at all, a bit each: others go on behind a scattering in a medium.
+    pub floor: u32,
 }
 
 impl Beam {
-    /// For up to `slots` eye paths at once.
+    /// For up to `slots` eye paths at once, with a queue in the memory `queues`.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -100,6 +104,7 @@ impl Beam {
         scene: &GpuScene,
         settings: &PhotonSettings,
         asking: BeamAsk<'_>,
+        queues: &QueueMemory,
         slots: u32,
     ) -> Result<Self> {
         let BeamAsk {
@@ -107,6 +112,7 @@ impl Beam {
             classes,
             surface_states,
             counts_bounces,
+            floor,
         } = asking;
         let profile = scene.profile();
         let queue = AskSpec {
@@ -114,7 +120,7 @@ impl Beam {
             counts_bounces,
             of_rays: true,
         };
-        let queue = Queue::new(gpu, scene, settings.queue, queue, slots)?;
+        let queue = Queue::new(gpu, scene, queues, queue)?;
         let tabulates = settings.volume_transmittance == VolumeTransmittance::Table;
         // Both entry points have the same constants.
         macro_rules! spec {
@@ -133,6 +139,7 @@ impl Beam {
                     beams: settings.volume.stores_ways(),
                     planes: settings.volume.stores_planes(),
                     points: settings.volume.stores_points(),
+                    tells_lights: settings.volume_paths,
                     compact_quota: settings.query_quota.min(BEAM_QUOTA),
                     count_fetches: settings.count_fetches,
                     counts_bounces,
@@ -170,7 +177,7 @@ impl Beam {
         let volume_states = match classes {
             Some(classes) => classes.asking()[1],
             None if settings.direct_photons => surface_states,
-            None => states_that_go_on_by(eye, LOBE_VOLUME.trailing_zeros()),
+            None => states_that_go_on_by(eye, LOBE_VOLUME.trailing_zeros()) & floor,
         };
         Ok(Self {
             gpu: gpu.clone(),
@@ -197,6 +204,7 @@ impl Beam {
                 settings.path_set.min_bounces(),
                 settings.path_set.max_bounces().unwrap_or(u32::MAX),
             ],
+            photons: settings.photons,
             classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
         })
     }
@@ -274,6 +282,7 @@ impl BeamStage<'_> {
             scale: self.scale,
             radius: self.radius,
             plane_weight: 1.0 / self.plane_share,
+            photons: self.beam.photons as f32,
             classes: self.beam.classes,
             ..Default::default()
         }

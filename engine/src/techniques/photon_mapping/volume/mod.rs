@@ -6,6 +6,10 @@
 //! Probabilistic Approach", ACM TOG 30(3), 2011; B. Bitterli and W. Jarosz, "Beyond Points and Beams: Higher-Dimensional Photon Samples for Volumetric Light
 //! Transport", ACM TOG 36(4), 2017; J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014.
 //!
+//! What is seen first by a scattering in a medium is the eye paths' where it is the only one, unless the map has direct light, and else the photons'. With eye paths that go on
+//! ([`volume_paths`](super::PhotonSettings::volume_paths)) collisions, beams and eye paths share it, each path of light by weights that sum to one
+//! ([`photon_share`](crate::transport::photon_share)), but for what a mirror scatters first, which no light sample finds: that stays with collisions and beams.
+//!
 //! Nothing of it is made for scenes without media. Bias: kernels blur, and lose the light of media by walls and boundaries as far as they reach, since there are
 //! no events beyond; a thin wall lets them through. Both fade as kernels shrink. Planes have none: what they carry is unbiased, the rest comes by beams.
 
@@ -38,7 +42,8 @@ pub enum VolumeEstimate {
     Beams,
     /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else.
     Planes,
-    /// Collisions and, in homogeneous media, ways: disks and beams, each weighted by what the other has of the same light (balance heuristic).
+    /// Collisions and, in homogeneous media, ways: disks and beams, each weighted by what the other has of the same light (balance heuristic); with
+    /// [`volume_paths`](super::PhotonSettings::volume_paths) also by what eye paths have of it that go on.
     Unified,
     /// Balls at places of the ray that lie as far apart as they are wide, from a first one by chance.
     March,
@@ -190,6 +195,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::beams_have_the_six_constants",
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
             "tests/tests/photon/volume_kernels.rs::beams_have_no_kernels_of_their_own",
+            "tests/tests/photon/volume_queues.rs::beams_are_the_same_in_every_form_on_any_number_of_threads",
             "tests/tests/photon/volume_truths.rs::slabs_have_the_radiance_of_the_tables",
             "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
         ],
@@ -198,24 +204,41 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "CL-PHOTON-UNIFIED",
-        name: "photon collisions and beams together, weighted by the balance heuristic",
+        name: "photon collisions and beams together, and eye paths that go on, weighted by the balance heuristic",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Points and beams alone, where eye paths first scatter: eye paths that go on, and planes, are not weighted against them; one radius for both; in grids collisions alone.",
+        limits: "Photons are seen where eye paths first scatter in a medium, under one radius for both, in grids collisions alone; eye paths go on only where `volume_paths` asks for them, and have none of what a mirror scatters first; their weights take the ends of a path alone, without transmittances and as if lights and first scatterings were even; planes are not weighted against the others.",
         sources: &[sources::KRIVANEK_2014.whole(), sources::VEACH_1997.at("9.2.2")],
         bias: Some(BIAS),
         shaders: &[
             "shaders/techniques/photon_mapping/photon_beam.comp",
             "shaders/techniques/photon_mapping/photon_event.glsl",
             "shaders/techniques/photon_mapping/photon_medium.comp",
+            "shaders/transport/photon_share.glsl",
+            "shaders/techniques/path/path_medium.comp",
+            "shaders/techniques/path/path_shade.comp",
         ],
         tests: &[
             "engine/src/techniques/photon_mapping/volume/event.rs::shares_of_collisions_are_those_of_the_balance_heuristic",
+            "engine/src/transport/photon_share.rs::eye_paths_and_photons_share_every_path",
+            "engine/src/transport/photon_share.rs::shares_are_those_of_densities_but_for_what_they_leave_out",
+            "engine/src/transport/photon_share.rs::lengths_do_not_show_and_narrow_kernels_leave_all_to_eye_paths",
+            "engine/src/transport/photon_share.rs::photons_carry_the_distance_of_their_first_scattering",
+            "engine/src/techniques/photon_mapping/path_classes.rs::eye_paths_and_maps_have_every_path_once",
             "tests/tests/photon/unified.rs::unified_estimates_agree_with_the_path_tracer",
             "tests/tests/photon/unified.rs::errors_are_near_to_those_of_the_better_estimate",
+            "tests/tests/photon/volume_queues.rs::unified_estimates_are_the_same_in_every_form_on_any_number_of_threads",
+            "tests/tests/photon/shared_paths.rs::photons_and_eye_paths_share_all_light",
+            "tests/tests/photon/shared_paths.rs::lamps_that_eye_paths_meet_are_shared",
+            "tests/tests/photon/shared_paths.rs::light_without_a_place_is_shared",
+            "tests/tests/photon/shared_paths.rs::direct_light_from_the_map_is_not_shared",
+            "tests/tests/photon/shared_paths.rs::shares_have_the_same_bits_however_it_is_done",
+            "tests/tests/photon/shared_paths.rs::eye_paths_go_on_beside_collisions_and_ways_alone",
             "tests/tests/photon/volume_truths.rs::rays_past_a_source_have_the_exact_multiple_scattering",
             "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
+            "tests/tests/twins/photons.rs::shares_with_eye_paths_agree_with_their_twins",
         ],
-        settings: &["volume"],
+        api: &["clerestory::transport::photon_share"],
+        settings: &["volume", "volume_paths"],
         ..Row::of(file!())
     },
     Row {
@@ -242,6 +265,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/planes.rs::single_scattering_is_that_of_beams",
             "tests/tests/photon/planes.rs::lengths_times_eight_give_a_sixty_fourth_by_planes",
             "tests/tests/photon/planes.rs::planes_that_a_quota_stops_go_through_all_records",
+            "tests/tests/photon/volume_queues.rs::planes_are_the_same_in_every_form_on_any_number_of_threads",
             "tests/tests/photon/planes.rs::planes_of_thin_bodies_are_no_larger_than_these",
             "tests/tests/photon/planes.rs::what_is_chosen_alone_has_planes",
             "tests/tests/photon/planes.rs::errors_of_planes_fall_with_the_root_of_passes",
@@ -263,6 +287,7 @@ pub(crate) const ROWS: &[Row] = &[
         shaders: &["shaders/techniques/photon_mapping/photon_beam.comp"],
         tests: &[
             "engine/src/techniques/photon_mapping/volume/event.rs::kernels_integrate_to_one_over_space_and_marches_to_a_disk",
+            "tests/tests/photon/volume_queues.rs::marches_are_the_same_in_every_form_on_any_number_of_threads",
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
         ],
         settings: &["volume"],

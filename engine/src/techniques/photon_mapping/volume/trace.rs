@@ -124,6 +124,7 @@ impl VolumeTrace {
             sampler_kind: plan.sampler as u32,
             has_differentials: plan.follows_footprints,
             has_classes: options.has_classes,
+            tells_lights: plan.tells_lights,
             short_ways: options.beams == BeamLength::Short,
             stores_ways,
             stores_planes,

@@ -24,7 +24,7 @@ use crate::metal_forms::sheet;
 const SIDES: [u32; 2] = [32, 16];
 /// Widths of lobes; at 1 the lobe is the cosine.
 const ALPHAS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
-/// Exponents of the lobes of Phong's model: those of the thesis, with a narrower one before and the cosine behind.
+/// Exponents of the lobes of Phong's model: those of a doctoral thesis on metals and reflections on graphics hardware, with a narrower one before and the cosine behind.
 const EXPONENTS: [f64; 4] = [50.0, 10.0, 5.0, 1.0];
 /// Lights along a side of a face that these lobes sum over.
 const LIGHTS: u32 = 32;
@@ -346,7 +346,7 @@ impl Study for Found {
             )
             .note("A cube of 32² texels a face of a room with walls of different radiance and a bright patch, seen from its middle, convolved into 16² texels a face.")
             .and(Findings::of(&self.lobes, OF_LOBES).note(
-                "A look-up in such a map by the mirrored direction is the model by Phong, as the thesis has it for glossy surfaces; its exponents are 5 and 10. Here the map is of 16² \
+                "A look-up in such a map by the mirrored direction is the model by Phong, as a doctoral thesis on metals and reflections on graphics hardware has it for glossy surfaces; its exponents are 5 and 10. Here the map is of 16² \
                  texels a face, each the sum of 32² lights a face of the same room.",
             ))
             .and(Findings::of(&self.harmonics, OF_HARMONICS).note("Of the same map, in place of a convolved one; the third and the fifth order add nothing to irradiance."))

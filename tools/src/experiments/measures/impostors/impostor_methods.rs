@@ -7,6 +7,9 @@ use clerestory::gpu::Gpu;
 use clerestory::maps::impostor::layouts::{ImpostorLayout, ImpostorLayouts};
 use clerestory::maps::impostor::places::blended_maps;
 use clerestory::maps::impostor::proxy::{box_proxy, hemisphere_proxy, sphere_proxy};
+use clerestory::maps::impostor::published::{
+    BY_PROXIES, Figures, PROXY_RADII, Published, REFRACTED, SEEN_SHARES, name, searches,
+};
 use clerestory::maps::impostor::room::ShinySphere;
 use clerestory::maps::impostor::{
     Impostor, ImpostorImage, ImpostorRay, ImpostorSearch, ImpostorSettings, SearchMethod,
@@ -15,7 +18,6 @@ use clerestory::maps::{MapImage, Parametrization};
 use glam::DVec3;
 
 use super::mirrored_rooms;
-use super::published_searches::{Figures, Published, SEEN_SHARES, name, searches};
 use super::search_times::{self, Beside, Steps};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
@@ -297,11 +299,7 @@ fn timed(
 /// What needs no distances: shapes in place of the room, several maps, refraction of the classical look-up.
 fn without_distances(side: u32) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
-    let published: [(ShinySphere, [f64; 3]); 2] = [
-        (ShinySphere::B, [2.51, 1.24, 2.43]),
-        (ShinySphere::C, [6.90, 3.43, 7.21]),
-    ];
-    for (sphere, spheres) in published {
+    for (sphere, spheres) in BY_PROXIES {
         let rays = sphere.rays(side, None);
         let mut add = |way: String, published: Figures, of: &dyn Fn(DVec3, DVec3) -> DVec3| {
             let directions: Vec<DVec3> = rays.iter().map(|ray| of(ray.origin, ray.direction)).collect();
@@ -310,7 +308,7 @@ fn without_distances(side: u32) -> Result<Vec<Row>> {
         add(BOX.into(), Figures::NONE, &|x, r| {
             x + box_proxy(x, r, DVec3::NEG_ONE, DVec3::ONE) * r
         });
-        for (radius, published) in [1.0, 1.2, 1.5].into_iter().zip(spheres) {
+        for (radius, published) in PROXY_RADII.into_iter().zip(spheres) {
             let of = |x: DVec3, r: DVec3| x + sphere_proxy(x, r, radius) * r;
             add(
                 format!("{SPHERE} {radius} in place of the room"),
@@ -351,11 +349,7 @@ fn refracted(gpu: &Gpu, side: u32, texels: f64) -> Result<Vec<Row>> {
     let image = ImpostorImage::from_fn(map, map.size_for(texels), 1, true, |d| sphere.room.surfaces(d))?;
     let impostor = Impostor::new(gpu, &image)?;
     let mut rows = Vec::new();
-    for (method, steps, published) in [
-        (SearchMethod::Classical, 0, 17.28),
-        (SearchMethod::SecantFromGuess, 0, 0.073),
-        (SearchMethod::FalsePosition, 3, 0.004),
-    ] {
+    for (method, steps, published) in REFRACTED {
         let settings = ImpostorSettings::of(method, steps);
         let hits = impostor.search(&rays, &settings)?;
         let directions: Vec<DVec3> = hits.iter().map(|hit| hit.direction).collect();

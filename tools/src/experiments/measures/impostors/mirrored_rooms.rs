@@ -35,7 +35,7 @@ const WALLS: [DVec3; 6] = [
 ];
 const OBSTACLE: DVec3 = DVec3::new(0.6, 0.1, 0.6);
 /// Squares along half a wall, and what of its colour every second one has.
-const SQUARES: f64 = 4.0;
+pub(super) const SQUARES: f64 = 4.0;
 const DARK: f64 = 0.3;
 /// What sides of a box across x, y and z have of its colour.
 const SHADES: [f64; 3] = [1.0, 0.7, 0.45];
@@ -43,7 +43,7 @@ const SHADES: [f64; 3] = [1.0, 0.7, 0.45];
 const WITHIN: f64 = 1.0 - 1e-6;
 
 /// The colour of a surface at a point, by its normal.
-fn color(point: DVec3, normal: DVec3) -> DVec3 {
+pub(super) fn color(point: DVec3, normal: DVec3) -> DVec3 {
     let axis = normal.abs().max_position();
     if point.abs().max_element() < WITHIN {
         return SHADES[axis] * OBSTACLE;

@@ -1,6 +1,7 @@
 //! Maps with distances: searches along rays in them, and the light of their texels at other places.
 
 pub mod convolved_maps;
+mod cut_stone;
 pub mod exact_room;
 pub mod gather_counts;
 pub mod gather_fireballs;
@@ -14,11 +15,13 @@ pub mod impostor_motion;
 pub mod impostor_occlusion;
 pub mod impostor_roots;
 pub mod impostor_trace;
+mod judged_pictures;
 mod lit_spheres;
 mod mirrored_rooms;
 pub mod moving_mirror;
 mod moving_pictures;
+pub mod previous_reflections;
 pub mod published_lobe;
-pub mod published_searches;
 pub mod search_times;
+mod shining_rooms;
 pub mod virtual_images;

@@ -6,7 +6,7 @@ use clerestory::raster::ShadowLayout;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{Camera, LightKind, Scene};
 use clerestory::techniques::preview::{
-    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows, SearchedReflections,
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows, ProbeMap, SearchedReflections,
 };
 use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
@@ -145,10 +145,11 @@ impl<'a> Game<'a> {
                 width: 0,
                 suns: 0,
             }),
-            has_probes: true,
+            probes: Some(ProbeMap::Octahedron),
         };
         let preview = Preview::new(gpu, &on_device, desc)?;
         let map = LightProbeDesc {
+            map: ProbeMap::Octahedron,
             side: quality.map,
             finest: FINEST,
         };

@@ -19,18 +19,18 @@ use crate::experiments::measures::Context;
 /// Cells along a side of each wall, two triangles each.
 const CELLS: [u32; 4] = [4, 8, 16, 32];
 /// Index of diamond.
-const INDEX: f64 = 2.42;
+pub(super) const INDEX: f64 = 2.42;
 /// Angles of incidence at a facet's middle, and half of what it is seen under from the eye, degrees.
 const TILTS: [f64; 3] = [0.0, 30.0, 60.0];
 const HALVES: [f64; 3] = [1.0, 2.0, 4.0];
 /// Places of views: the room's middle, which sees nothing of the sphere behind the pillar, and others.
-const PLACES: [DVec3; 4] = [
+pub(super) const PLACES: [DVec3; 4] = [
     DVec3::ZERO,
     DVec3::new(0.1, 0.2, 0.8),
     DVec3::new(0.3, -0.2, 0.7),
     DVec3::new(0.75, 0.3, -0.6),
 ];
-const MAP: Parametrization = Parametrization::OctahedronQuadratic;
+pub(super) const MAP: Parametrization = Parametrization::OctahedronQuadratic;
 
 rows! {
     /// Walls in triangles.
@@ -114,12 +114,12 @@ const OF_VIEWS: &[Criterion<Views>] = &[
 ];
 
 /// Triangles of six walls of so many cells along a side.
-fn triangles(cells: u32) -> u64 {
+pub(super) fn triangles(cells: u32) -> u64 {
     12 * u64::from(cells) * u64::from(cells)
 }
 
 /// All walls of the room in triangles.
-fn walls(cells: u32) -> Vec<[DVec3; 3]> {
+pub(super) fn walls(cells: u32) -> Vec<[DVec3; 3]> {
     let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
     let wall = |wall: u32| {
         let axis = wall as usize / 2;

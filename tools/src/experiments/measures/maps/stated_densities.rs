@@ -10,7 +10,7 @@ use crate::experiments::findings::{Bound, Criterion, rows};
 const FIGURES: [&str; 4] = [LEAST, GREATEST, "RMS of ratio − 1", "greatest shear"];
 const LEAST: &str = "least ratio";
 const GREATEST: &str = "greatest ratio";
-/// Maps with what the thesis states, by figure.
+/// Maps with what is stated of them, by figure.
 pub const STATED: [(Parametrization, [&str; 4]); 8] = [
     (Parametrization::LatLong, ["0", "1.571", "0.483", "∞"]),
     (Parametrization::Sphere, ["1", "1", "0", "∞"]),

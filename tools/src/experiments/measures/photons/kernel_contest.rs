@@ -10,9 +10,10 @@ use crate::experiments::reference::SEED;
 use crate::experiments::unbiased;
 use crate::experiments::watch::render;
 
-/// Pixels on a side; in a smoke run, also the samples per pixel of references.
+/// Pixels on a side; in a smoke run, also the samples per pixel of references, and photons of a pass whatever settings say.
 const SIDE: u32 = 20;
 const SMOKE_PICTURE: (u32, u32) = (8, 256);
+const SMOKE_PHOTONS: u32 = 1 << 12;
 const TURNS: usize = 5;
 /// Passes that say how long one takes.
 const FEW_PASSES: u32 = 2;
@@ -132,11 +133,15 @@ impl Stage {
 
     /// `None` when it was stopped.
     fn picture(&self, context: &Context<'_>, of: &Candidate, passes: u32, seed: u32) -> Result<Option<Scored>> {
+        let mut settings = (of.settings)(self.diagonal);
+        if let Some(photons) = context.pick(None, Some(SMOKE_PHOTONS)) {
+            settings["photons"] = photons.into();
+        }
         let options = RenderOptions {
             technique: Some("photon".into()),
             spp: passes,
             seed,
-            settings: (of.settings)(self.diagonal).into(),
+            settings: settings.into(),
             ..self.base.clone()
         };
         let Some(rendered) = render(&self.renderer, &options, context.watch)? else {

@@ -3,7 +3,7 @@
 //! Sources: T. Engelhardt and C. Dachsbacher, VMV 2008; B. Karis, SIGGRAPH 2013. Oracle: a map of 2048² texels, and sums of the lobes over it in f64.
 
 use clerestory::Result;
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe};
+use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, ProbeMap};
 use glam::Vec3;
 
 use super::live_stages::{DIRECTIONS, FINEST, IRRADIANCE, MIRROR, MIRRORS, REFERENCE, Reference, SUMMED, Stage};
@@ -89,6 +89,7 @@ impl Found {
             .iter()
             .map(|side| {
                 stage.live(LightProbeDesc {
+                    map: ProbeMap::Octahedron,
                     side: *side,
                     finest: FINEST,
                 })

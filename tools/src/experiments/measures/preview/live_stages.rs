@@ -7,7 +7,7 @@ use clerestory::raster::ShadowLayout;
 use clerestory::scene::{LightKind, Scene};
 use clerestory::techniques::preview::probe::probe_level;
 use clerestory::techniques::preview::{
-    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewShadows, ReflectionMap, ReflectionMapDesc,
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewShadows, ProbeMap, ReflectionMap, ReflectionMapDesc,
 };
 use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
@@ -83,7 +83,7 @@ impl<'a> Stage<'a> {
                 width: 0,
                 suns: 0,
             }),
-            has_probes: false,
+            probes: None,
         };
         let mut preview = Preview::new(gpu, &scene, desc)?;
         let mut recorder = gpu.recorder("lights")?;
@@ -182,7 +182,15 @@ impl Reference {
         let mut draw = |count: usize| -> Vec<DVec3> { (0..count).map(|_| random.direction()).collect() };
         let (directions, mirrors) = (draw(DIRECTIONS), draw(MIRRORS));
         let finest = FINEST_OF_REFERENCE;
-        let mirror = stage.live(LightProbeDesc { side, finest })?.probe().map().read(0)?;
+        let mirror = stage
+            .live(LightProbeDesc {
+                map: ProbeMap::Octahedron,
+                side,
+                finest,
+            })?
+            .probe()
+            .map()
+            .read(0)?;
         let mut image = mirror.clone();
         while image.size().x > summed {
             image = image.coarser()?;

@@ -148,7 +148,7 @@ fn row(gpu: &Gpu, turned: f64, size: u32, spp: u32) -> Result<Row> {
             width: 0,
             suns: 0,
         }),
-        has_probes: false,
+        probes: None,
     };
     let mut preview = Preview::new(gpu, on_device, desc)?;
     let mirror = PlanarMirror::new(gpu, on_device, &preview)?;

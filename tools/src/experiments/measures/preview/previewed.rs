@@ -6,12 +6,18 @@ use clerestory::gpu::Gpu;
 use clerestory::raster::ShadowLayout;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{Camera, LightKind, Scene};
-use clerestory::techniques::preview::{LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows};
+use clerestory::techniques::preview::{
+    LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, PreviewShadows, ProbeMap,
+};
 use glam::Vec3;
 use serde_json::json;
 
 /// The live map.
-pub const MAP: LightProbeDesc = LightProbeDesc { side: 256, finest: 128 };
+pub const MAP: LightProbeDesc = LightProbeDesc {
+    map: ProbeMap::Octahedron,
+    side: 256,
+    finest: 128,
+};
 /// Places of live maps along each axis of the box around a scene, as shares of it: nine at half its height.
 const SHARES: [f32; 3] = [0.25, 0.5, 0.75];
 /// Seed of the path tracer, which no preview has.
@@ -81,7 +87,7 @@ impl<'a> Subject<'a> {
                 width: 0,
                 suns: 0,
             }),
-            has_probes: has_live_map,
+            probes: has_live_map.then_some(ProbeMap::Octahedron),
         };
         let preview = Preview::new(self.gpu, scene, desc)?;
         let live = has_live_map

@@ -8,7 +8,7 @@ use clerestory::maps::box_lobe::{WeightedBox, sat_border};
 use clerestory::maps::prefilter::weighted_texels;
 use clerestory::maps::spherical_sat::sat_half_width;
 use clerestory::maps::{MapImage, Parametrization};
-use clerestory::techniques::preview::{LightProbeDesc, ReflectionMap, ReflectionMapDesc};
+use clerestory::techniques::preview::{LightProbeDesc, ProbeMap, ReflectionMap, ReflectionMapDesc};
 use glam::{DVec3, DVec4, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -151,7 +151,15 @@ impl FineMap {
             all.filter(is_meant).take(DIRECTIONS).collect()
         };
         let directions = [draw(false), draw(true)];
-        let fine = stage.live(LightProbeDesc { side, finest: 32 })?.probe().map().read(0)?;
+        let fine = stage
+            .live(LightProbeDesc {
+                map: ProbeMap::Octahedron,
+                side,
+                finest: 32,
+            })?
+            .probe()
+            .map()
+            .read(0)?;
         let mut means = fine.clone();
         while means.size().x > summed {
             means = means.coarser()?;

@@ -1,7 +1,7 @@
 //! Curves of four metals at three wavelengths by the exact factor, the rescaled curve and the compensated one, with their errors; and where the exact factor
 //! of metals lies farthest below the rescaled curve.
 //!
-//! Oracles: the exact factor in f64, and the places that were published (the spec's digest of the thesis on metals, §4.4).
+//! Oracles: the exact factor in f64, and the places that were published.
 
 use clerestory::scene::{FresnelForm, metals};
 
@@ -208,7 +208,7 @@ impl MetalCurves {
             .fold(f64::MIN_POSITIVE, |most, gap| most.max(gap.value));
         let mut findings = Findings::of(&self.lobes, OF_LOBES)
             .note(
-                "Over 20,001 even cosines. The thesis has the least difference at a cosine near 0.1 to 0.15 for all metals; of the noble ones gold and copper at 435 nm \
+                "Over 20,001 even cosines. A doctoral thesis on metals and reflections on graphics hardware has the least difference at a cosine near 0.1 to 0.15 for all metals; of the noble ones gold and copper at 435 nm \
                  have it there.",
             )
             .and(Findings::of(&self.gaps, &[]).long())

@@ -1,7 +1,7 @@
 //! Where the exact factor of a metal has its least reflectance, up to which extinction it falls with the cosine of incidence, and what angles small
 //! cosines are.
 //!
-//! Oracle: values that were computed elsewhere for the same indices (the spec's digest of the thesis on metals, §4.6 and §4.8).
+//! Oracle: values that were computed elsewhere for the same indices.
 
 use clerestory::scene::FresnelForm;
 
@@ -54,7 +54,7 @@ const LIMITS: [[f64; 2]; 19] = [
 const LAST_TENTH: u32 = 37;
 /// Indices between which the boundary meets no extinction at all.
 const CLOSING: [f64; 2] = [3.0, 4.0];
-/// Cosines with the angle to a tenth of a degree, and to a whole one as the thesis has it.
+/// Cosines with the angle to a tenth of a degree, and to a whole one as it was printed.
 const ANGLES: [[f64; 3]; 7] = [
     [0.0, 90.0, 90.0],
     [0.05, 87.1, 87.0],
@@ -111,7 +111,7 @@ rows! {
         cosine: f64 = "cosine of incidence",
         angle: f64 = "angle of incidence (°)",
         tenths: f64 = "published to a tenth (°)",
-        whole: f64 = "thesis, to a whole degree (°)",
+        whole: f64 = "printed to a whole degree (°)",
     }
 }
 
@@ -178,7 +178,7 @@ const OF_ANGLES: &[Criterion<Angle>] = &[
     .because("half of the last printed digit")
     .in_every_form(),
     Criterion::each(
-        "angles are the thesis': difference to the whole degree (°)",
+        "angles are the printed ones: difference to the whole degree (°)",
         Bound::AtMost(0.5),
         |row: &Angle| (row.angle - row.whole).abs().into(),
     )
@@ -312,7 +312,7 @@ impl Dips {
                 ),
             )
             .and(Findings::of(&self.limits, OF_LIMITS).note(
-                "Over 2,001 even cosines. The thesis says about 2 at n = 1.5. The last row is where the boundary meets k = 0.",
+                "Over 2,001 even cosines. A doctoral thesis on metals and reflections on graphics hardware says about 2 at n = 1.5. The last row is where the boundary meets k = 0.",
             ))
             .curves(
                 "boundary",
@@ -321,7 +321,7 @@ impl Dips {
                 curves(&boundary, |row| row.0.into(), |row| (row.1, row.2.into())),
             )
             .and(Findings::of(&self.angles, OF_ANGLES).note(
-                "The thesis prints 75° for a cosine of 0.25, which is 75.52°: the one whole degree that is not the nearest.",
+                "Printed is 75° for a cosine of 0.25, which is 75.52°: the one whole degree that is not the nearest.",
             ))
     }
 }

@@ -84,13 +84,13 @@ rows! {
 }
 
 rows! {
-    /// A metal whose errors the thesis names.
-    struct Headline = "Greatest errors of the rescaled curve with Hagemann's constants, beside the thesis" by [metal] {
+    /// A metal whose errors were printed.
+    struct Headline = "Greatest errors of the rescaled curve with Hagemann's constants, beside the printed ones" by [metal] {
         metal: String = "metal",
         worst: f64 = "greatest relative error of three wavelengths (%)",
         least: f64 = "least that is accepted (%)",
         most: f64 = "most that is accepted (%)",
-        stated: f64 = "thesis (%)",
+        stated: f64 = "printed (%)",
     }
 }
 
@@ -149,7 +149,7 @@ const OF_ERRORS: &[Criterion<Row>] = &[
     .among(|row| row.form == FresnelForm::Compensated.name()),
 ];
 const OF_HEADLINES: &[Criterion<Headline>] = &[Criterion::each(
-    "the thesis' headline is within the spread of data: how far outside (percentage points)",
+    "the printed headline is within the spread of data: how far outside (percentage points)",
     Bound::AtMost(0.0),
     |row: &Headline| (row.least - row.worst).max(row.worst - row.most).into(),
 )];
@@ -426,7 +426,7 @@ impl Study for Found {
                  curve takes the best of none, the rule where its guard lets it pass, and a fit. Schlick's curve has no k.",
             )
             .and(Findings::of(&self.headlines, OF_HEADLINES).note(
-                "The thesis states about 2, 6, 5 and 18 % without its constants; bands are those that published data sets give. The band of gold ends at 9 % \
+                "A doctoral thesis on metals and reflections on graphics hardware states about 2, 6, 5 and 18 % without its constants; bands are those that published data sets give. The band of gold ends at 9 % \
                  since its blue was published to be 8.60 % off by these constants, which is that of another index: see the table below.",
             ))
             .and(Findings::of(&self.gold, OF_GOLD).note(

@@ -1,7 +1,7 @@
 //! What the rescaled curve and its compensating term are made of: one minus Schlick's curve, scaled; its errors by index and extinction; the term
 //! by its coefficient and exponent.
 //!
-//! Oracles: the exact factor in f64, closed forms, and values that were computed elsewhere (the spec's digest of the thesis on metals, §4.6).
+//! Oracles: the exact factor in f64, closed forms, and values that were computed elsewhere.
 
 use clerestory::scene::FresnelForm;
 use clerestory::transport::fresnel::compensated::{Compensation, rule};

@@ -64,7 +64,7 @@ rows! {
 }
 
 rows! {
-    /// A metal at an end of the range that the thesis names.
+    /// A metal at an end of the range that a doctoral thesis on metals and reflections on graphics hardware names.
     struct End = "Fall of two metals' n from 430 to 705 nm" by [metal, wavelength] {
         metal: String = "metal",
         wavelength: f64 = "wavelength (nm)",

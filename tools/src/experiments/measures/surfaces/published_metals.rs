@@ -1,4 +1,4 @@
-//! Greatest errors that were published for the forms of metals' Fresnel factors: the spec's digest of the thesis on metals, §4.5.
+//! Greatest errors of the forms of metals' Fresnel factors, as they were computed independently of the engine.
 
 /// A metal at a wavelength, and errors in percent.
 pub struct Published {

@@ -1,4 +1,4 @@
-//! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, their spikes, and orders in which points take them; on the device those that are kept from frame to frame,
+//! Virtual lights: on the host, in the unit box, their walks, their potential, their spikes, and orders in which points take them; on the device those that are kept from frame to frame,
 //! light that is, and what discs of reflective shadow maps have of it.
 
 pub mod deferred_stages;

@@ -1,7 +1,7 @@
 //! Lights in the order of what they might bring: how many carry how much (by `vpl_shares`), what it costs to leave the others out, and how long an order may be kept.
 //!
 //! Oracle: what all lights bring. Source of what this follows: the chapter on virtual light sources of a doctoral thesis on metals and reflections on graphics
-//! hardware, figures 6.4 to 6.8 and 6.10 to 6.13, and its digest's own figures for the same box.
+//! hardware, figures 6.4 to 6.8 and 6.10 to 6.13, and figures that were computed elsewhere for the same box.
 
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
 //! What lights of the unit box might bring to the points of a picture: how many of them carry how much, and what each might bring to one point.
 //!
-//! Source of what this follows: the chapter on virtual light sources of a doctoral thesis on metals and reflections on graphics hardware, figures 6.4 to 6.8, and its digest's own figures
-//! for the same box.
+//! Source of what this follows: the chapter on virtual light sources of a doctoral thesis on metals and reflections on graphics hardware, figures 6.4 to 6.8, and figures that were
+//! computed elsewhere for the same box.
 
 use clerestory::Result;
 use clerestory::techniques::instant_radiosity::selection::{

@@ -1,7 +1,7 @@
 //! Spikes of virtual lights in corners, and what a least distance takes of them and of all light.
 //!
 //! Oracle: the same lights, seen by the same rays, without a bound. Source of what this follows: the chapter on virtual light sources of a doctoral thesis on metals and reflections on graphics
-//! hardware, §6.2 and figure 6.3, and its digest's own figures for the same box.
+//! hardware, §6.2 and figure 6.3, and figures that were computed elsewhere for the same box.
 
 use clerestory::Result;
 use clerestory::film::png::Rgb8;
@@ -26,8 +26,8 @@ const NONE: f64 = 0.0;
 const TWENTIETH: f64 = 0.05;
 const TENTH: f64 = 0.1;
 const FIFTH: f64 = 0.2;
-/// What the digest found with three seeds of its own: the greatest pixel over the 99th percentile, and the light lost, %.
-const DIGEST: [(f64, [&str; 2]); 4] = [
+/// What was computed elsewhere with three other seeds: the greatest pixel over the 99th percentile, and the light lost, %.
+const ELSEWHERE: [(f64, [&str; 2]); 4] = [
     (NONE, ["6.8 to 35.0", "0"]),
     (TWENTIETH, ["2.4 to 3.0", "0.25 to 1.9"]),
     (TENTH, ["1.12 to 1.75", "0.7 to 3.0"]),
@@ -46,16 +46,16 @@ rows! {
         spike: f64 = "greatest pixel over the 99th percentile",
         lost: f64 = "light lost (%)",
     }
-    beside "digest: greatest pixel over the 99th percentile" = |row| row.digest()[0].into();
-    beside "digest: light lost (%)" = |row| row.digest()[1].into();
+    beside "computed elsewhere: greatest pixel over the 99th percentile" = |row| row.elsewhere()[0].into();
+    beside "computed elsewhere: light lost (%)" = |row| row.elsewhere()[1].into();
 }
 
 /// What was found.
 pub type Found = Vec<Row>;
 
 impl Row {
-    fn digest(&self) -> [&'static str; 2] {
-        let known = DIGEST.iter().find(|(distance, _)| *distance == self.distance);
+    fn elsewhere(&self) -> [&'static str; 2] {
+        let known = ELSEWHERE.iter().find(|(distance, _)| *distance == self.distance);
         known.map_or(["none"; 2], |(_, found)| *found)
     }
 }
@@ -188,7 +188,7 @@ impl Study for Found {
             )
             .note(format!(
                 "The unit box with {WALKS} walks from its lamp, whose own points are lights as in the source, {} × {} pixels, all surfaces by Lambert's law. The same lights and rays with each least distance, whose square \
-                 bounds that in the denominator; the digest's seeds are others.",
+                 bounds that in the denominator; what was computed elsewhere has other seeds.",
                 SIZE[0][0], SIZE[0][1]
             ));
         if self.is_empty() {

@@ -1,0 +1,175 @@
+//! Shares of light in media that photons find as well as eye paths that go on: the balance heuristic of both, by what is known at either end of a path.
+//!
+//! Light from x₀ is scattered at x₁ … xₖ, k ≥ 2, the last time in a medium that a ray from the eye goes through. An eye path collides at xₖ and goes on to x₁, where it samples the light; of n
+//! photons one comes to xₖ, and is seen within a radius r of the ray as a collision (density n σ e^(−σs) π r² …) or as a beam (n 2 r sin …). The density of a path by one over that by the other is a
+//! product over its places, in which densities of scattering between two places are the same from both sides and cancel, with the extinction and the transmittance between them. What is left are the
+//! ends, of which these shares take the phase function and the angle at xₖ and the distance d of the light from x₁:
+//!
+//! eye / photons = d² / e²,  e² = n (π r² + 2 r sin θ / σ) / (16 π² p(xₖ)).
+//!
+//! They leave out the transmittances from the eye to xₖ, along the last flight of a beam and from the light to x₁, and take light and x₁ for ones that send and scatter evenly. So the shares are near to those of
+//! the balance heuristic, not the least noise there is; but the same function of a path for both, so that they sum to one for every path, and eye paths are not biased by them. A photon that is seen beside the
+//! ray has the share of its own way: that blurs as its light does, and fades as kernels shrink. Eye paths do not find light that a mirror
+//! scatters first, and light that no photon carries is theirs alone: that d² is 0, or not asked for. The distance d makes up for the 1/d² of light samples next to lights, whose variance has no bound.
+//!
+//! Sources: J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014, whose weights take whole densities; E. Veach, "Robust Monte Carlo Methods for
+//! Light Transport Simulation", 1997, 9.2.2. Units: m, m⁻¹, m². Scaling lengths changes no share. Twin of `transport/photon_share.glsl`.
+
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// Squared distance of a light, m², of whose light photons and eye paths have half each.
+///
+/// The eye path is scattered first with this density of its phase function, sr⁻¹, into a direction at this sine to the one before, in a medium of this mean extinction, m⁻¹; so many photons of
+/// a pass are seen there within a radius, m, as collisions and, where there are some, as beams.
+pub fn even_distance2(phase: f64, sine: f64, extinction: f64, radius: f64, photons: f64, has_beams: bool) -> f64 {
+    let of_beams = if has_beams {
+        2.0 * radius * sine / extinction
+    } else {
+        0.0
+    };
+    photons * (PI * radius * radius + of_beams) / (16.0 * PI * PI * phase)
+}
+
+/// Share of eye paths in light whose squared distance from its first scattering is `light2`, m², in \[0, 1\].
+pub fn eye_share(light2: f64, even2: f64) -> f64 {
+    if light2 > 0.0 {
+        1.0 / (1.0 + even2 / light2)
+    } else {
+        0.0
+    }
+}
+
+/// That of photons: what eye paths leave.
+pub fn photon_share(light2: f64, even2: f64) -> f64 {
+    if light2 > 0.0 {
+        1.0 / (1.0 + light2 / even2)
+    } else {
+        1.0
+    }
+}
+
+/// Stands for the squared distance of light without a place, from infinity or that a medium emits, in a scene of that box, m²: what the disk that light from infinity goes through has in its place.
+pub fn placeless_distance2(lower: DVec3, upper: DVec3) -> f64 {
+    (upper - lower).length_squared() / 16.0
+}
+
+/// Squared distance of the light as a photon carries it that is scattered after `bounce` scatterings and a way, m; `carried` before, 0 at first but for light without a place.
+///
+/// A mirror that scatters first leaves 0: eye paths do not find such light.
+pub fn carried_distance2(carried: f64, bounce: u32, way: f64, rough: bool) -> f64 {
+    match (bounce, rough) {
+        (1.., _) => carried,
+        (0, false) => 0.0,
+        (0, true) if carried > 0.0 => carried,
+        (0, true) => way * way,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_random::Random;
+
+    fn place(random: &mut Random) -> DVec3 {
+        random.vector().as_dvec3() * 2.0
+    }
+
+    #[test]
+    fn eye_paths_and_photons_share_every_path() {
+        let mut random = Random(7);
+        for _ in 0..10_000 {
+            let [light2, even2] = [(); 2].map(|()| f64::from(random.magnitude(-40, 40)));
+            let both = eye_share(light2, even2) + photon_share(light2, even2);
+            assert!((both - 1.0).abs() < 1e-15, "{light2} {even2}: {both}");
+            assert!((eye_share(light2, even2) / photon_share(light2, even2) / (light2 / even2) - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(eye_share(2.0, 2.0), 0.5);
+        // What eye paths do not find is the photons', and no phase function of zero leaves light out.
+        assert_eq!([eye_share(0.0, 1.0), photon_share(0.0, 1.0)], [0.0, 1.0]);
+        assert_eq!([eye_share(0.0, 0.0), photon_share(0.0, 0.0)], [0.0, 1.0]);
+        assert_eq!(
+            [eye_share(1.0, f64::INFINITY), photon_share(1.0, f64::INFINITY)],
+            [0.0, 1.0]
+        );
+        assert_eq!([eye_share(1.0, 0.0), photon_share(1.0, 0.0)], [1.0, 0.0]);
+    }
+
+    /// The densities of whole paths, place by place from either end, against what the shares take and what they leave out.
+    #[test]
+    fn shares_are_those_of_densities_but_for_what_they_leave_out() {
+        let mut random = Random(8);
+        let isotropic = 1.0 / (4.0 * PI);
+        for round in 0..400 {
+            let scatterings = 2 + round % 4;
+            let extinction = f64::from(random.magnitude(-4, 3));
+            let radius = f64::from(random.magnitude(-8, -2));
+            let photons = f64::from(random.magnitude(0, 20));
+            let passed = |a: DVec3, b: DVec3| (-extinction * a.distance(b)).exp();
+            // From the light on: its place, those of the scatterings, and the eye's.
+            let places: Vec<DVec3> = (0..scatterings + 2).map(|_| place(&mut random)).collect();
+            let (first, last, eye) = (places[1], places[scatterings], places[scatterings + 1]);
+            let sine = (eye - last)
+                .normalize()
+                .cross((last - places[scatterings - 1]).normalize())
+                .length();
+            // Of a flight from one place that collides at the other, by volume.
+            let flight = |a: DVec3, b: DVec3| isotropic * extinction * passed(a, b) / a.distance_squared(b);
+            // Along the ray, on which the eye path collides, by length; then place by place. The light is a point, which light samples find for certain.
+            let by_eye: f64 = extinction
+                * passed(eye, last)
+                * (1..scatterings)
+                    .map(|i| flight(places[i + 1], places[i]))
+                    .product::<f64>();
+            // A photon leaves the light, collides, and comes within the radius of the ray: as a collision, or on a way that passes.
+            let before: f64 = photons
+                * (0..scatterings - 1)
+                    .map(|i| flight(places[i], places[i + 1]))
+                    .product::<f64>();
+            let previous = places[scatterings - 1];
+            let as_collision = before * flight(previous, last) * PI * radius * radius;
+            let as_beam = before * isotropic / previous.distance_squared(last) * 2.0 * radius * sine;
+            for has_beams in [false, true] {
+                let by_photons = as_collision + if has_beams { as_beam } else { 0.0 };
+                let even2 = even_distance2(isotropic, sine, extinction, radius, photons, has_beams);
+                let light2 = places[0].distance_squared(first);
+                let across = |attenuated: f64| {
+                    PI * radius * radius
+                        + if has_beams {
+                            2.0 * radius * sine / (extinction * attenuated)
+                        } else {
+                            0.0
+                        }
+                };
+                let left_out =
+                    passed(eye, last) / passed(places[0], first) * across(1.0) / across(passed(previous, last));
+                let ratio = by_eye / by_photons / (light2 / even2 * left_out);
+                assert!((ratio - 1.0).abs() < 1e-9, "{scatterings} scatterings: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn lengths_do_not_show_and_narrow_kernels_leave_all_to_eye_paths() {
+        let even = |scale: f64, radius: f64| even_distance2(0.2, 0.5, 3.0 / scale, radius * scale, 1e4, true);
+        for scale in [1e-3, 1e3] {
+            assert!((even(scale, 0.02) / (scale * scale * even(1.0, 0.02)) - 1.0).abs() < 1e-12);
+        }
+        assert!(photon_share(1.0, even(1.0, 1e-9)) < 1e-6 && eye_share(1.0, even(1.0, 1e3)) < 1e-6);
+    }
+
+    #[test]
+    fn photons_carry_the_distance_of_their_first_scattering() {
+        assert_eq!(carried_distance2(0.0, 0, 3.0, true), 9.0);
+        assert_eq!(carried_distance2(0.0, 0, 3.0, false), 0.0);
+        // Of light without a place what it began with.
+        let far = placeless_distance2(DVec3::splat(-1.0), DVec3::splat(1.0));
+        assert_eq!(far, 0.75);
+        assert_eq!(carried_distance2(far, 0, 3.0, true), far);
+        assert_eq!(carried_distance2(far, 0, 3.0, false), 0.0);
+        for rough in [false, true] {
+            assert_eq!(carried_distance2(9.0, 1, 5.0, rough), 9.0);
+            assert_eq!(carried_distance2(0.0, 2, 5.0, rough), 0.0);
+        }
+    }
+}

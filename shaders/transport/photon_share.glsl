@@ -1,0 +1,35 @@
+// Shares of light in media that photons find as well as eye paths that go on. Source, meaning and proof: transport/photon_share.rs, whose twin this is.
+#ifndef CLERESTORY_TRANSPORT_PHOTON_SHARE_GLSL
+#define CLERESTORY_TRANSPORT_PHOTON_SHARE_GLSL
+
+#include "pi.glsl"
+
+float mean_extinction(vec3 sigma_t) { return (sigma_t.x + sigma_t.y + sigma_t.z) / 3.0; }
+
+// Squared distance of a light, m2, of whose light photons and eye paths have half each: where the eye path is scattered first into a direction with this density and at this sine to the one
+// before, and so many photons of a pass are seen there within a radius as collisions and, where there are some, as beams.
+float even_distance2(float phase, float sine, float extinction, float radius, float photons, bool has_beams) {
+    float across = PI * radius * radius;
+    if (has_beams) {
+        across += 2.0 * radius * sine / extinction;
+    }
+    return photons * across / (16.0 * PI * PI * phase);
+}
+
+// Share of eye paths in light of that squared distance, and that of photons, which is what they leave. Neither divides by what is not positive, nor is one of infinities no number.
+float eye_share(float light2, float even2) { return light2 > 0.0 ? 1.0 / (1.0 + even2 / light2) : 0.0; }
+float photon_share(float light2, float even2) { return light2 > 0.0 ? 1.0 / (1.0 + light2 / even2) : 1.0; }
+
+// Stands for the squared distance of light without a place: from infinity, or that a medium emits; by the box of the scene, m2.
+float placeless_distance2(vec3 lower, vec3 upper) {
+    vec3 across = upper - lower;
+    return dot(across, across) / 16.0;
+}
+
+// Squared distance of the light, as a photon that has been scattered carries it: what it `carried` before, 0 at first but for light without a place. A mirror that scatters first leaves 0, since
+// eye paths do not find such light.
+float carried_distance2(float carried, uint bounce, float way, bool rough) {
+    return bounce > 0u ? carried : !rough ? 0.0 : carried > 0.0 ? carried : way * way;
+}
+
+#endif
