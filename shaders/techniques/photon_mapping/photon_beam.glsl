@@ -3,7 +3,8 @@
 // surface that the path has met, for the surface's query behind it.
 //
 // L = sum_j K(d_j / h_j) / h_j^2 tau(t_j) p(w_j, -v) Phi_j, with Phi_j the flux that the event scatters: the corrected units of the source, where the albedo stands
-// instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam.
+// instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam; of short ones, which end by chance as
+// flights in the band that comes farthest do, it is what other bands have less of.
 // Of planes L = sum_j tau(t_j) sigma_s^2 p(w_j', -v) tau_j' Phi_j / |v . (w_j x w_j')| with the directions w_j and w_j' of both flights, and tau_j' what is left there of other
 // bands than the one that flights end as in: without blur. One of those that a ray meets has a ray that tells whether it is seen (photon_plane_ray.glsl).
 // Where collisions are stored beside beams each has the share of the balance heuristic (point_share). Where eye paths go on, both have but the share that these leave (photons_share).
@@ -43,6 +44,7 @@ layout(constant_id = 55) const bool BEAMS = false;   // the map holds ways of ph
 layout(constant_id = 56) const bool PLANES = false;  // and planes
 layout(constant_id = 57) const bool POINTS = false;  // and collisions
 const bool WIDE = PLANES || POINTS;
+layout(constant_id = 61) const bool SHORT_WAYS = false;  // ways end by chance
 
 // Tells the words of the choice among planes from others.
 const uint PLANE_CHOICE_KEY = 0x10000000u;
@@ -85,9 +87,13 @@ bool counts_here(uint medium, uint history) {
     return counts;
 }
 
+// As long as short beams are there for a collision, so is the flight that may end in it: their shares do not depend on its length.
 float share_of_points(float flight, float sine) {
-    return point_share(mean_extinction(beam.m.sigma_t), flight, push.radius, push.radius, sine);
+    return point_share(mean_extinction(beam.m.sigma_t), SHORT_WAYS ? 0.0 : flight, push.radius, push.radius, sine);
 }
+
+// What takes from light along a beam.
+vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s, beam.m.sigma_t) : beam.m.sigma_t; }
 
 // Share of a record's light that eye paths which go on leave to photons, by the density of its phase function.
 float photons_share(uvec4 q2, float phase, float sine, bool has_beams) {
@@ -105,7 +111,7 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
         BeamMeeting at = meet_beam(beam.origin, beam.direction, b.start, way);
         float relative = at.squared / (push.radius * push.radius);
         if (at.sine > 0.0 && relative < 1.0 && at.along >= 0.0 && at.along < reach && at.t > beam.from && at.t < beam.to) {
-            vec3 passed = passed_to(at.t) * transmittance(beam.m.sigma_t, at.along);
+            vec3 passed = passed_to(at.t) * transmittance(way_extinction(), at.along);
             float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
             float phase = phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
             weight *= phase;
@@ -226,7 +232,7 @@ bool gather_events() {
         return true;
     }
     // A march's places reach as far beyond the way's ends as kernels do, and count within alone.
-    float far = min(beam.to, largest_component(beam.reach));
+    float far = min(beam.to, beam.reach);
     bool complete = compact_beam_query(event_root, Ray(beam.origin, beam.from, beam.direction, far));
     count_work(QUERY_STEP_WORK * compact_steps + GRID_ITERATION_WORK * grid_iterations, QUERY_STEP_WORK * WORK_UNIT);
     return complete;

@@ -31,6 +31,8 @@ pub(in crate::techniques) const CARD: Card = Card {
         queue::ROWS,
         tracer::ROWS,
         volume::ROWS,
+        volume::transmittance::ROWS,
+        volume::ways::ROWS,
     ],
     bias: BIAS,
     needs: &[],

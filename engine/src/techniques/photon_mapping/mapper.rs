@@ -27,7 +27,7 @@ use super::settings::{MapBuild, MediaLengths, PhotonSettings};
 use super::tracer::{PhotonAppend, PhotonCounts, PhotonTracer, Tracing, flux_scale};
 use super::volume::event::{PhotonEvent, unpack_event};
 use super::volume::footprint::EventKernelSettings;
-use super::volume::{EventMap, EventMaps};
+use super::volume::{EventMap, EventMaps, paths_in_flight};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
@@ -178,12 +178,13 @@ impl PhotonMapper {
             submission_work: settings.submission_work,
             // What arrives is gathered and counted wave by wave, for each pass of photons.
             full_waves: false,
+            paths_in_flight: paths_in_flight(gpu, &scene),
             ..PathTracerSettings::default()
         };
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            let (plan, estimate) = (settings.plan(has_media), settings.volume);
-            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), estimate)
+            let (plan, stored) = (settings.plan(has_media), (settings.volume, settings.volume_beams));
+            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), stored)
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.

@@ -4,6 +4,8 @@ use super::kernel::{KernelProfile, KernelSettings, KernelShape};
 use super::path_classes::PathClasses;
 use super::tracer::{PhotonPlan, Stored};
 use super::volume::footprint::{EventKernelSettings, event_step};
+use super::volume::transmittance::VolumeTransmittance;
+use super::volume::ways::BeamLength;
 use super::volume::{VolumeEstimate, VolumeKernel};
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
@@ -133,6 +135,12 @@ crate::settings! {
         /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there; or collisions and ways together, each
         /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin; in grids there are collisions alone.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
+        /// How far ways of photons are stored, of estimates that have some: to the next surface, weighted by what is left of light along them, or each as far as a flight comes, which is as light in
+        /// the band that comes farthest does. Short ones are fewer to meet, which takes less time and memory, and noisier.
+        pub volume_beams: BeamLength = BeamLength::Long;
+        /// What a density grid leaves of light along an eye ray: a walk finds it by ratio tracking, the same for all photons that the ray sees, and unbiased for each; or a table of its
+        /// logarithm at 64 places, which has no noise and takes as long in any grid, but errs by what the density does within a 64th of the way.
+        pub volume_transmittance: VolumeTransmittance = VolumeTransmittance::Walk;
         /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.

@@ -25,6 +25,7 @@ use super::glow::GlowStage;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
 use super::volume::footprint::EventKernelSettings;
+use super::volume::ways::BeamLength;
 use super::volume::{VolumeEstimate, VolumeOptions, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
@@ -137,21 +138,22 @@ struct Kit {
 
 impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
-        Self::in_media(gpu, scene, plan, append, None, VolumeEstimate::Ray)
+        Self::in_media(gpu, scene, plan, append, None, (VolumeEstimate::Ray, BeamLength::Long))
     }
 
-    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep what an estimate sees.
+    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep what an estimate sees, with beams of a length.
     pub(super) fn in_media(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
         plan: PhotonPlan,
         append: Box<dyn Append>,
         classes: Option<&PathClasses>,
-        estimate: VolumeEstimate,
+        (estimate, beams): (VolumeEstimate, BeamLength),
     ) -> Result<Self> {
         let media = VolumeOptions {
             has_classes: classes.is_some(),
             estimate,
+            beams,
         };
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let has_differentials = plan.follows_footprints;

@@ -196,6 +196,7 @@ measures! {
     on_device "volume-frame" photons::volume_frame;
     on_device "volume-scenes" photons::volume_scenes;
     on_device "volume-queues" photons::volume_queues;
+    on_device "volume-transmittance" photons::volume_transmittance;
     on_device "vpl-history" virtual_lights::vpl_history;
     on_device "vpl-incremental" virtual_lights::vpl_incremental;
     on_host "vpl-order" virtual_lights::vpl_order;

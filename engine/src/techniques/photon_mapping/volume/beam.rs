@@ -8,8 +8,12 @@ use std::sync::OnceLock;
 use super::VolumeEstimate;
 use super::map::EventMap;
 use super::plane_rays::PlaneRays;
+use super::transmittance::VolumeTransmittance;
+use super::ways::BeamLength;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS, QUEUE_SLOTS};
+use crate::gpu::shaders::constants::{
+    LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS, QUEUE_SLOTS, WALK_GROUP, WAY_STEPS,
+};
 use crate::gpu::shaders::sets::{PhotonBeamSet, WaveSet};
 use crate::gpu::shaders::techniques::photon_mapping::{photon_beam, photon_beam_packet, photon_beam_ways};
 use crate::gpu::shaders::types::{AskSettings, BeamWay};
@@ -21,11 +25,13 @@ use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses
 use crate::techniques::photon_mapping::queue::{AskSpec, Queue, QueueMemory};
 use crate::techniques::photon_mapping::settings::{MapQuery, PhotonSettings};
 use crate::transport::{GpuScene, PathSet};
-use crate::walk::{Places, WalkKey, stage_barrier};
+use crate::walk::{Places, WalkKey, default_slots, stage_barrier};
 use crate::{Error, Result};
 
 /// Nodes and events of a query, at most: beside a walk through a grid, its loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
 const BEAM_QUOTA: u32 = 32_768;
+/// Bytes of the steps of a walk through a grid, or of its table.
+const STEPS_BYTES: usize = WAY_STEPS as usize * size_of::<[f32; 4]>();
 
 type Counters = photon_beam::BeamCounters;
 
@@ -46,6 +52,8 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     linear: (Box<photon_beam::Spec>, OnceLock<ComputePipeline<photon_beam::Kernel>>),
     ways: Buffer,
     asked: Buffer,
+    /// Of ways through grids, what is left of light along them.
+    steps: Buffer,
     /// Only where the map has planes.
     planes: Option<PlaneRays>,
     counters: Buffer,
@@ -113,6 +121,7 @@ impl Beam {
             of_rays: true,
         };
         let queue = Queue::new(gpu, scene, queues, queue)?;
+        let tabulates = settings.volume_transmittance == VolumeTransmittance::Table;
         // Both entry points have the same constants.
         macro_rules! spec {
             ($shader:ident, $queue:expr, $linear:expr) => {
@@ -124,6 +133,8 @@ impl Beam {
                     has_homogeneous: profile.media.homogeneous,
                     sampler_kind: settings.sampler as u32,
                     profile: settings.profile as u32,
+                    tabulates,
+                    short_ways: settings.volume_beams == BeamLength::Short,
                     marches: settings.volume == VolumeEstimate::March,
                     beams: settings.volume.stores_ways(),
                     planes: settings.volume.stores_planes(),
@@ -150,10 +161,11 @@ impl Beam {
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             sampler_kind: settings.sampler as u32,
+            tabulates,
             has_classes: classes.is_some(),
             ..Default::default()
         };
-        let asked = if profile.media.heterogeneous { slots } else { 1 };
+        let in_grids = if profile.media.heterogeneous { slots } else { 1 };
         let work = |name: &str, bytes: usize, count: u32| {
             gpu.buffer(&BufferDesc::storage(
                 name,
@@ -177,7 +189,8 @@ impl Beam {
             queue,
             linear: (Box::new(spec!(photon_beam, QUEUE_SLOTS, true)), OnceLock::new()),
             ways: work("beam ways", size_of::<BeamWay>(), slots)?,
-            asked: work("beam asked", size_of::<f32>(), asked)?,
+            asked: work("beam asked", size_of::<f32>(), in_grids)?,
+            steps: work("beam steps", STEPS_BYTES, in_grids)?,
             planes: settings
                 .volume
                 .stores_planes()
@@ -250,6 +263,7 @@ impl BeamStage<'_> {
             beam_counters: counters.view(),
             photon_beam_ways: self.beam.ways.view(),
             photon_beam_asked: self.beam.asked.view(),
+            photon_way_steps: self.beam.steps.view(),
             photon_plane_rays: planes.as_ref().map_or(counters.view(), PlaneRays::rays),
             gather_head: queue.gather_head,
             beam_places: queue.gather_places,
@@ -361,6 +375,16 @@ impl BeamStage<'_> {
         stage_barrier(pass);
         Ok(())
     }
+}
+
+/// Eye paths under way at once, at most, so that what rays through grids keep can be bound; 0 leaves their number as it is.
+pub(in crate::techniques::photon_mapping) fn paths_in_flight(gpu: &Gpu, scene: &GpuScene) -> u32 {
+    let most = gpu.caps().max_storage_buffer_range / STEPS_BYTES as u64;
+    if !scene.profile().media.heterogeneous || most >= u64::from(default_slots(gpu)) {
+        return 0;
+    }
+    let most = most as u32;
+    (most - most % WALK_GROUP).max(WALK_GROUP)
 }
 
 /// The states of eye paths that may go on by a lobe, a bit each.

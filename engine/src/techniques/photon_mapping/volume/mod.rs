@@ -21,8 +21,10 @@ pub mod neighbor;
 pub mod plane;
 mod plane_rays;
 mod trace;
+pub mod transmittance;
+pub mod ways;
 
-pub(super) use beam::{Beam, BeamAsk, BeamStage};
+pub(super) use beam::{Beam, BeamAsk, BeamStage, paths_in_flight};
 pub(super) use map::{EventMap, EventMaps};
 pub(super) use plane_rays::SWEEPS_MAX;
 pub(super) use trace::{Room, VolumeOptions, VolumePass, VolumeTrace};
@@ -36,7 +38,7 @@ use crate::gpu::shaders::constants::{EVENT_QUARTERS, WIDE_QUARTERS};
 pub enum VolumeEstimate {
     /// The beam estimate: disks across the ray, one query for all of it.
     Ray,
-    /// Beams: ways of photons through homogeneous media as far as the next surface, each seen where the ray passes it.
+    /// Beams: ways of photons through homogeneous media, as far as the next surface or by chance ([`BeamLength`](ways::BeamLength)), each seen where the ray passes it.
     Beams,
     /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else.
     Planes,
@@ -138,7 +140,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-VOL-7",
         name: "beam estimate: one query of the volume map per ray, in corrected units (PM-VOL-6 are the original ones)",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Single scattering is the eye paths' by default; in a grid light from an event passes by chance, which costs noise.",
+        limits: "Single scattering is the eye paths' by default; in a grid the transmittance along a ray is an estimate, the same for all that the ray sees.",
         sources: &[
             sources::FABIANOWSKI_2011.at("§7.1"),
             sources::JAROSZ_2008.whole(),

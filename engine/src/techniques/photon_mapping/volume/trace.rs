@@ -7,6 +7,7 @@ use super::VolumeEstimate;
 use super::event::{EventWords, MEDIUM_WORD};
 use super::footprint::EventKernelSettings;
 use super::plane::WideWords;
+use super::ways::BeamLength;
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, NO_MEDIUM};
@@ -55,6 +56,8 @@ pub(in crate::techniques::photon_mapping) struct VolumeOptions {
     pub has_classes: bool,
     /// What is stored.
     pub estimate: VolumeEstimate,
+    /// Of ways.
+    pub beams: BeamLength,
 }
 
 /// Where records of a wave begin, and how many there is room for.
@@ -122,6 +125,7 @@ impl VolumeTrace {
             has_differentials: plan.follows_footprints,
             has_classes: options.has_classes,
             tells_lights: plan.tells_lights,
+            short_ways: options.beams == BeamLength::Short,
             stores_ways,
             stores_planes,
             stores_points,

@@ -19,3 +19,4 @@ pub mod volume_dampening;
 pub mod volume_frame;
 pub mod volume_queues;
 pub mod volume_scenes;
+pub mod volume_transmittance;
