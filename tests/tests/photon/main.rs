@@ -27,6 +27,7 @@ mod volume;
 mod volume_kernels;
 mod volume_queues;
 mod volume_truths;
+mod without;
 
 use std::f64::consts::PI;
 

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use super::map::PhotonMap;
 use super::path_classes::{ASKING_STATES, PathClasses};
 use super::queue::{AskSpec, Queue};
-use super::settings::{MapQuery, PhotonSettings};
+use super::settings::{MapQuery, MapQueue, PhotonSettings};
 use super::volume::{Beam, BeamAsk, BeamStage, EventMap, SWEEPS_MAX};
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
@@ -77,6 +77,8 @@ impl std::ops::AddAssign for RayFetches {
 
 /// Each point by itself, or those of a subgroup together.
 enum Query {
+    /// No surface may be diffuse: no point asks, and there is no map that could be asked.
+    None,
     Single(ComputePipeline<photon_gather::Kernel>),
     Packet(ComputePipeline<photon_gather_packet::Kernel>),
 }
@@ -88,7 +90,7 @@ enum Linear {
         Box<photon_gather::Spec>,
         OnceLock<ComputePipeline<photon_gather::Kernel>>,
     ),
-    /// Refused: a pass through all records cannot find neighbours.
+    /// Refused: a pass through all records cannot find neighbours. Where no point asks, none is stopped.
     Refuse,
 }
 
@@ -116,7 +118,8 @@ pub(super) struct Gather {
 pub(super) struct GatherStage<'a> {
     gather: &'a Gather,
     scene: &'a GpuScene,
-    map: &'a PhotonMap,
+    /// None where no point asks.
+    map: Option<&'a PhotonMap>,
     /// Of stored fluxes, in W a photon.
     scale: f32,
     neighbors: u32,
@@ -154,7 +157,10 @@ impl Gather {
             counts_bounces: set.min_bounces() > least || set.max_bounces().is_some(),
             of_rays: false,
         };
-        let queue = Queue::new(gpu, scene, settings.queue, ask, slots)?;
+        let asks = scene.has_diffuse_base();
+        // Places themselves are no queue.
+        let queue = if asks { settings.queue } else { MapQueue::Slots };
+        let queue = Queue::new(gpu, scene, queue, ask, slots)?;
         let nearest = settings.neighbors > 0;
         let has_media = scene.profile().media.any();
         // Both entry points have the same constants.
@@ -178,10 +184,7 @@ impl Gather {
             };
         }
         let query = match settings.query {
-            MapQuery::Packet if gpu.caps().subgroup.vote => {
-                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, queue.kind(), false))?)
-            }
-            MapQuery::Packet => {
+            MapQuery::Packet if !gpu.caps().subgroup.vote => {
                 return Err(Error::MissingFeature {
                     feature: "VK_SUBGROUP_FEATURE_VOTE_BIT".into(),
                     needed_by: "photon_gather_packet".into(),
@@ -189,9 +192,13 @@ impl Gather {
                     instead: "ask the map point by point: \"query\": \"single\"".into(),
                 });
             }
+            _ if !asks => Query::None,
+            MapQuery::Packet => {
+                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, queue.kind(), false))?)
+            }
             MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_gather, queue.kind(), false))?),
         };
-        let linear = if nearest {
+        let linear = if nearest || !asks {
             Linear::Refuse
         } else {
             Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
@@ -230,20 +237,21 @@ impl Gather {
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = self.queue.pipelines();
-        all.push(match &self.query {
-            Query::Single(kernel) => kernel.info(),
-            Query::Packet(kernel) => kernel.info(),
-        });
+        match &self.query {
+            Query::None => {}
+            Query::Single(kernel) => all.push(kernel.info()),
+            Query::Packet(kernel) => all.push(kernel.info()),
+        }
         all.extend(self.beam.iter().flat_map(Beam::pipelines));
         all
     }
 
-    /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
+    /// Queries of a map of surfaces, if there is one, whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
     /// of the map of events there.
     pub fn stage<'a>(
         &'a self,
         scene: &'a GpuScene,
-        map: &'a PhotonMap,
+        map: Option<&'a PhotonMap>,
         events: Option<EventsAsked<'a>>,
         scale: f64,
         (neighbors, radius): (u32, f64),
@@ -312,12 +320,12 @@ impl GatherStage<'_> {
         }
     }
 
-    fn set(&self) -> PhotonMapSet<'_> {
+    fn set<'a>(&'a self, map: &'a PhotonMap) -> PhotonMapSet<'a> {
         PhotonMapSet {
-            photon_pairs: &self.map.pairs,
-            photon_map_records: &self.map.records,
+            photon_pairs: &map.pairs,
+            photon_map_records: &map.records,
             gather_counters: self.gather.counters.view(),
-            photon_map_root: self.map.root.view(),
+            photon_map_root: map.root.view(),
             photon_beam_ways: self
                 .gather
                 .beam
@@ -330,7 +338,6 @@ impl GatherStage<'_> {
 impl ArrivalStage for GatherStage<'_> {
     fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
         let gather = self.gather;
-        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
         if let Some(beam) = &self.beam {
             beam.record(recorder, self.scene, wave, places)?;
         }
@@ -339,6 +346,12 @@ impl ArrivalStage for GatherStage<'_> {
                 planes.record(pass, self.scene, wave, places)
             })?;
         }
+        let Some(map) = self.map else { return Ok(()) };
+        let (scene, map, queue) = (
+            self.scene.scene_set(),
+            self.set(map),
+            gather.queue.set(&gather.counters),
+        );
         let mut groups = places.items;
         if gather.queue.collects() {
             recorder.pass("photon: gather queue", |pass| {
@@ -351,6 +364,7 @@ impl ArrivalStage for GatherStage<'_> {
         recorder.pass("photon: gather", |pass| {
             let (sets, push): ([&dyn BindingSet<'_>; 4], _) = ([wave, &scene, &queue, &map], self.push());
             match &gather.query {
+                Query::None => {}
                 Query::Single(kernel) => pass.dispatch_indirect(kernel, &sets, &push, groups)?,
                 Query::Packet(kernel) => pass.dispatch_indirect(kernel, &sets, &bytemuck::cast(push), groups)?,
             }
@@ -419,10 +433,11 @@ impl ArrivalStage for GatherStage<'_> {
                 return Ok(Some(part + 1));
             }
         }
-        if gather.counters_readback.read::<Counters>(0, 1)?[0].stopped == 0 {
+        let stopped_points = gather.counters_readback.read::<Counters>(0, 1)?[0].stopped;
+        let Some(map) = self.map.filter(|_| stopped_points > 0) else {
             // Beams alone have stopped.
             return Ok(None);
-        }
+        };
         let Linear::Records(_, made) = &gather.linear else {
             return Err(Error::Overflow {
                 kernel: "photon_gather".into(),
@@ -437,8 +452,12 @@ impl ArrivalStage for GatherStage<'_> {
             what: "photon map".into(),
             fault: "has stopped queries without the kernel for them".into(),
         })?;
-        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
-        let parts = LinearParts::new(gather.quota, self.map.count, stopped);
+        let parts = LinearParts::new(gather.quota, map.count, stopped);
+        let (scene, map, queue) = (
+            self.scene.scene_set(),
+            self.set(map),
+            gather.queue.set(&gather.counters),
+        );
         let (mut part, mut taken) = (part.saturating_sub(first_part), 0);
         recorder.pass("photon: gather all", |pass| {
             while part < parts.count() && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {

@@ -339,7 +339,12 @@ impl PhotonTracer {
         let differentials = if has_differentials { slots } else { 1 };
         let work = |name, bytes: usize| gpu.buffer(&BufferDesc::storage(name, bytes as u64, Category::Work));
         let quarters = append.quarters();
-        let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
+        let capacity = if plan.stores_lights || scene.has_diffuse_base() {
+            (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32
+        } else {
+            // None is deposited, but there is no buffer of nothing.
+            1
+        };
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
         let volume = || VolumeTrace::new(gpu, &scene, &plan, media, slots);
         let volume = profile.media.any().then(volume).transpose()?;

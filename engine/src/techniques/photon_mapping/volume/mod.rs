@@ -285,6 +285,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::collisions_are_as_many_as_the_albedo_says",
             "tests/tests/photon/volume_truths.rs::collisions_about_a_source_are_those_of_the_exact_fluence",
             "tests/tests/photon/volume.rs::scenes_without_media_have_nothing_of_it",
+            "tests/tests/photon/without.rs::without_media_there_is_no_pass_byte_or_branch_of_them_and_the_same_bits",
             "tests/tests/photon/volume.rs::threads_never_show_in_media",
         ],
         settings: &["photons"],
