@@ -31,6 +31,7 @@ pub(in crate::techniques) const CARD: Card = Card {
         queue::ROWS,
         tracer::ROWS,
         volume::ROWS,
+        volume::footprint::ROWS,
     ],
     bias: BIAS,
     needs: &[],

@@ -108,7 +108,7 @@ pub enum VolumeKernel {
     Fixed,
     /// As the photon's footprint is.
     Footprint,
-    /// As far as the [`NEIGHBORS`](neighbor::NEIGHBORS)-th nearest of the other events in its medium.
+    /// As far as the nearest of the other events in its medium of which the setting `volume_neighbors` says the number.
     Neighbor,
 }
 
@@ -314,7 +314,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-VOL-8",
-        name: "kernels in media as wide as the 85th neighbour is far",
+        name: "kernels in media as wide as a neighbour is far, the 85th by default",
         role: Role::PartOf("PM-SYS-1"),
         limits: "The host finds neighbours, which takes longer than all the rest of a pass; a baseline for kernels from footprints.",
         sources: &[
@@ -328,7 +328,44 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume_kernels.rs::kernels_by_neighbours_hold_so_many",
             "tests/tests/photon/volume_kernels.rs::rays_see_the_kernels_that_events_have",
         ],
-        settings: &["volume_kernel"],
+        settings: &["volume_kernel", "volume_neighbors"],
         ..Row::of(file!())
+    },
+    Row {
+        id: "BG-6",
+        name: "beam estimate with kernels by neighbours, as a baseline of light in media",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "A million collisions and 117 neighbours, as the source has them, are settings; the host finds neighbours.",
+        sources: &[
+            sources::ENGELHARDT_2013.at("4.6 and 10.4"),
+            sources::JAROSZ_2008.whole(),
+        ],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/photon_beam.comp"],
+        tests: &[
+            "tests/tests/photon/volume_kernels.rs::kernels_by_neighbours_hold_so_many",
+            "tests/tests/photon/volume_kernels.rs::rays_see_the_kernels_that_events_have",
+            "tests/tests/photon/volume.rs::airlight_has_its_six_constants",
+        ],
+        settings: &["volume", "volume_kernel", "volume_neighbors", "photons"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-SYS-2",
+        name: "photon mapping of participating media as a whole: photons through media, kernels from footprints, a compact map, queries along rays, a moving light",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Photons, map and kernels are made anew for each frame; the source's queries by packets are a setting.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.5")],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/"],
+        tests: &[
+            "tests/tests/photon/volume.rs::kernels_from_footprints_agree_with_the_path_tracer",
+            "tests/tests/photon/volume.rs::grids_agree_with_the_path_tracer",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
+            "tests/tests/photon/without.rs::without_diffuse_surfaces_there_is_no_map_of_them_and_the_same_bits",
+            "tests/tests/photon/without.rs::without_media_there_is_no_pass_byte_or_branch_of_them_and_the_same_bits",
+        ],
+        settings: &["volume", "volume_kernel", "queue", "query"],
+        ..Row::of("engine/src/techniques/photon_mapping/mapper.rs")
     },
 ];
