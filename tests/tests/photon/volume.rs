@@ -2,6 +2,7 @@
 
 use super::*;
 use clerestory::Error;
+use clerestory::gpu::{GpuOptions, Lesser};
 use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase, Projection};
 use clerestory::techniques::photon_mapping::volume::event::{EventWords, PhotonEvent};
 use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
@@ -9,7 +10,7 @@ use clerestory::techniques::photon_mapping::{MapBuild, MappedEvent};
 use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::render::{builtin, cuboid, medium, quad};
 use clerestory_tests::statistics::expect_mean_of;
-use clerestory_tests::{gpu, with_gpu};
+use clerestory_tests::{gpu, gpu_with, with_gpu};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -626,6 +627,54 @@ fn room_for_events_grows() {
         assert_eq!(first, second);
         assert_eq!(first, events);
     });
+}
+
+#[test]
+fn collisions_beyond_a_buffer_are_refused_by_the_name_of_its_limit() {
+    // A 128th of what each device has: there 2²² collisions of 32 bytes fit.
+    const RANGE: u64 = 1 << 20;
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            max_storage_buffer_range: Some(RANGE),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    // Nine collisions a photon, and ten ways, of which no more than one piece each is left at last.
+    let scene = endless(medium(1.0, 0.9, Phase::Isotropic));
+    for volume in [VolumeEstimate::Ray, VolumeEstimate::Beams] {
+        let of = |photons| {
+            let settings = PhotonSettings {
+                volume,
+                volume_radius: 0.1,
+                ..direct(photons)
+            };
+            let mut mapper = mapper(&gpu, &scene, &settings);
+            while mapper.step(1)?.is_some() {}
+            Ok::<u64, Error>(mapper.counts().events)
+        };
+        match of(1 << 12) {
+            Err(Error::Overflow {
+                what,
+                needed,
+                capacity,
+                instead,
+                ..
+            }) => {
+                assert!(
+                    what.contains("events") && what.contains("maxStorageBufferRange"),
+                    "{what}"
+                );
+                assert!(capacity == RANGE / 32 && needed > capacity, "{needed} {capacity}");
+                assert!(instead.contains("`photons`"), "{instead}");
+            }
+            other => panic!("{volume:?}: {other:?}"),
+        }
+        // Fewer are not.
+        let fit = of(1 << 11).unwrap_or_else(|error| panic!("{volume:?}: {error}"));
+        assert!(fit > 1 << 14 && fit <= RANGE / 32, "{volume:?}: {fit}");
+    }
+    clerestory_tests::assert_no_messages(&gpu);
 }
 
 #[test]

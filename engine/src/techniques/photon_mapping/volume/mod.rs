@@ -287,6 +287,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume.rs::scenes_without_media_have_nothing_of_it",
             "tests/tests/photon/without.rs::without_media_there_is_no_pass_byte_or_branch_of_them_and_the_same_bits",
             "tests/tests/photon/volume.rs::threads_never_show_in_media",
+            "tests/tests/photon/volume.rs::room_for_events_grows",
+            "tests/tests/photon/volume.rs::collisions_beyond_a_buffer_are_refused_by_the_name_of_its_limit",
         ],
         settings: &["photons"],
         ..Row::of(file!())
