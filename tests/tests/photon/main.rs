@@ -26,6 +26,7 @@ mod unified;
 mod volume;
 mod volume_kernels;
 mod volume_queues;
+mod volume_refusals;
 mod volume_truths;
 mod without;
 

@@ -3,7 +3,7 @@
 use super::*;
 use clerestory::Error;
 use clerestory::gpu::{GpuOptions, Lesser};
-use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase, Projection};
+use clerestory::scene::{Camera, DensityGrid, Medium, Phase, Projection};
 use clerestory::techniques::photon_mapping::volume::event::{EventWords, PhotonEvent};
 use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
 use clerestory::techniques::photon_mapping::{MapBuild, MappedEvent};
@@ -697,44 +697,6 @@ fn scenes_without_media_have_nothing_of_it() {
         assert!(!has(&fog, "photon_append"));
         let (events, counts) = all_events(gpu, &builtin("builtin:cornell-box"), &direct(1 << 10), 0);
         assert!(events.is_empty() && counts.photons.events == 0 && counts.photons.collisions == 0);
-    });
-}
-
-#[test]
-fn what_photons_cannot_bring_through_media_is_refused() {
-    with_gpu(|gpu| {
-        let refuse = |scene: &Scene, settings: PhotonSettings| {
-            let made = PhotonMapper::new(gpu, upload(gpu, scene), &scene.cameras[0], SIZE, settings);
-            match made {
-                Ok(_) => panic!("{} was accepted", scene.name),
-                Err(error) => error,
-            }
-        };
-        let mut glowing = endless(medium(1.0, 0.5, Phase::Isotropic));
-        glowing.media[0].emission = Vec3::ONE;
-        let error = refuse(&glowing, settings("all"));
-        assert!(error.to_string().contains("emits everywhere"), "{error}");
-        for (volume, word) in [(VolumeEstimate::Beams, "beams"), (VolumeEstimate::Planes, "planes")] {
-            let ways = PhotonSettings {
-                volume,
-                ..settings("all")
-            };
-            match refuse(&lit_box(uneven(medium(1.0, 0.5, Phase::Isotropic))), ways) {
-                Error::Setting { name, value, .. } => assert_eq!((name.as_ref(), value.as_ref()), ("volume", word)),
-                other => panic!("{other}"),
-            }
-        }
-        let mut sky = endless(medium(1.0, 0.5, Phase::Isotropic));
-        sky.environment = Some(Environment::uniform(Vec3::ONE));
-        let error = refuse(&sky, settings("all"));
-        assert!(error.to_string().contains("light from infinity"), "{error}");
-        match refuse(
-            &endless(medium(1.0, 0.5, Phase::Isotropic)),
-            single(VolumeEstimate::Ray, f32::NAN),
-        ) {
-            Error::Setting { name, .. } => assert_eq!(name, "volume_radius"),
-            other => panic!("{other}"),
-        }
     });
 }
 
