@@ -24,6 +24,7 @@ mod sphere;
 mod traps;
 mod unified;
 mod volume;
+mod volume_counts;
 mod volume_kernels;
 mod volume_queues;
 mod volume_refusals;

@@ -282,6 +282,8 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         tests: &[
             "tests/tests/photon/volume.rs::photons_in_media_are_kept_to_the_count",
+            "tests/tests/photon/volume_counts.rs::photons_are_kept_to_the_count_by_every_estimate",
+            "tests/tests/photon/volume_counts.rs::photons_are_kept_to_the_count_whatever_becomes_of_them",
             "tests/tests/photon/volume.rs::collisions_are_as_many_as_the_albedo_says",
             "tests/tests/photon/volume_truths.rs::collisions_about_a_source_are_those_of_the_exact_fluence",
             "tests/tests/photon/volume.rs::scenes_without_media_have_nothing_of_it",
