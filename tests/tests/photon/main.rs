@@ -25,6 +25,7 @@ mod traps;
 mod unified;
 mod volume;
 mod volume_counts;
+mod volume_extremes;
 mod volume_kernels;
 mod volume_queues;
 mod volume_refusals;
