@@ -81,31 +81,30 @@ fn photons_are_kept_to_the_count_whatever_becomes_of_them() {
             }
         }
         let usual = fog(0.8);
-        let of = |set: &str| settings(set);
-        for settings in [
+        for asked in [
             // Ended after the second collision, or once no light path that is asked for goes on.
-            of("bounces=0..2"),
-            of("LVVE"),
+            settings("bounces=0..2"),
+            settings("LVVE"),
             PhotonSettings {
                 direct_photons: true,
-                ..of("all")
+                ..settings("all")
             },
             PhotonSettings {
                 final_gather: true,
-                ..of("all")
+                ..settings("all")
             },
             PhotonSettings {
                 volume_kernel: VolumeKernel::Footprint,
                 shape: KernelShape::Principal,
-                ..of("all")
+                ..settings("all")
             },
             // In as many submissions as there can be.
             PhotonSettings {
                 submission_work: 1,
-                ..of("all")
+                ..settings("all")
             },
         ] {
-            counted(gpu, &usual, settings);
+            counted(gpu, &usual, asked);
         }
     });
 }

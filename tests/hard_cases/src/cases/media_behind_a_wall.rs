@@ -1,7 +1,7 @@
 //! A caustic in fog behind a wall that has no thickness.
 
 use clerestory::Result;
-use clerestory::scene::{LightKind, Material, Phase, Scene, load};
+use clerestory::scene::{Camera, LightKind, Material, Phase, Scene, load};
 use glam::{DVec3, Vec3};
 
 use crate::scenes::{SMALL, cuboid, medium, orthographic};
@@ -53,7 +53,7 @@ fn caustic() -> Result<Scene> {
 }
 
 /// Rays along the wall, from one end of the box to the other, at a distance inside of it.
-fn along_the_wall(x: f64) -> clerestory::scene::Camera {
+fn along_the_wall(x: f64) -> Camera {
     let end = |y: f64| DVec3::new(x, y, 0.0);
     orthographic(end(-0.9), end(0.9), DVec3::X, HALF)
 }
