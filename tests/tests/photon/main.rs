@@ -27,9 +27,13 @@ mod sphere;
 mod traps;
 mod unified;
 mod volume;
+mod volume_counts;
+mod volume_extremes;
 mod volume_kernels;
 mod volume_queues;
+mod volume_refusals;
 mod volume_truths;
+mod without;
 
 use std::f64::consts::PI;
 

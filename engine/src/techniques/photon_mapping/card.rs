@@ -33,6 +33,7 @@ pub(in crate::techniques) const CARD: Card = Card {
         volume::ROWS,
         volume::transmittance::ROWS,
         volume::ways::ROWS,
+        volume::footprint::ROWS,
     ],
     bias: BIAS,
     needs: &[],
@@ -208,7 +209,13 @@ impl Technique for PhotonMapper {
         if !self.has_map() {
             skipped.push(Skipped {
                 what: "photons and their map",
-                why: "nothing sends light, or the path set has nothing of a map",
+                why: "nothing sends light, or nothing scatters it diffusely, or the path set has nothing of a map",
+            });
+        }
+        if self.has_map() && !self.has_surface_map() {
+            skipped.push(Skipped {
+                what: "the photon map of surfaces",
+                why: "no surface may be diffuse",
             });
         }
         if self.profile().has_unlit {
@@ -250,6 +257,8 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/photon/settings.rs::parts_of_the_light_sum_to_the_whole",
         "tests/tests/photon/scale.rs::powers_of_two_never_show",
         "tests/tests/photon/traps.rs::glass_is_not_black",
+        "tests/tests/photon/without.rs::without_diffuse_surfaces_there_is_no_map_of_them_and_the_same_bits",
+        "tests/tests/photon/without.rs::maps_of_surfaces_are_made_wherever_a_material_may_be_diffuse",
         "tests/tests/photon/traps.rs::the_ring_has_its_cusp_where_geometry_puts_it",
     ],
     api: &["clerestory::techniques::photon_mapping::PhotonMapper"],

@@ -32,6 +32,8 @@ const NEAREST_SEARCHES: u32 = NEAREST_ROUNDS + NEAREST_HALVINGS;
 
 /// Each point by itself, or those of a subgroup together.
 enum Query {
+    /// No surface may be diffuse: no point asks, and there is no map that could be asked.
+    None,
     Single(ComputePipeline<photon_gather::Kernel>),
     Packet(ComputePipeline<photon_gather_packet::Kernel>),
 }
@@ -43,7 +45,7 @@ enum Linear {
         Box<photon_gather::Spec>,
         OnceLock<ComputePipeline<photon_gather::Kernel>>,
     ),
-    /// Refused: a pass through all records cannot find neighbours.
+    /// Refused: a pass through all records cannot find neighbours. Where no point asks, none is stopped.
     Refuse,
 }
 
@@ -97,7 +99,9 @@ impl Gather {
             of_rays: false,
         };
         let queues = QueueMemory::new(gpu, settings.queue, slots)?;
-        let queue = Queue::new(gpu, scene, &queues, ask)?;
+        // Places themselves are no queue.
+        let asks = scene.has_diffuse_base();
+        let queue = Queue::new(gpu, scene, if asks { &queues } else { &QueueMemory::Slots }, ask)?;
         let nearest = settings.neighbors > 0;
         let has_media = scene.profile().media.any();
         // Both entry points have the same constants.
@@ -121,10 +125,7 @@ impl Gather {
             };
         }
         let query = match settings.query {
-            MapQuery::Packet if gpu.caps().subgroup.vote => {
-                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, queue.kind(), false))?)
-            }
-            MapQuery::Packet => {
+            MapQuery::Packet if !gpu.caps().subgroup.vote => {
                 return Err(Error::MissingFeature {
                     feature: "VK_SUBGROUP_FEATURE_VOTE_BIT".into(),
                     needed_by: "photon_gather_packet".into(),
@@ -132,9 +133,13 @@ impl Gather {
                     instead: "ask the map point by point: \"query\": \"single\"".into(),
                 });
             }
+            _ if !asks => Query::None,
+            MapQuery::Packet => {
+                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, queue.kind(), false))?)
+            }
             MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_gather, queue.kind(), false))?),
         };
-        let linear = if nearest {
+        let linear = if nearest || !asks {
             Linear::Refuse
         } else {
             Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
@@ -180,20 +185,21 @@ impl Gather {
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = self.queue.pipelines();
-        all.push(match &self.query {
-            Query::Single(kernel) => kernel.info(),
-            Query::Packet(kernel) => kernel.info(),
-        });
+        match &self.query {
+            Query::None => {}
+            Query::Single(kernel) => all.push(kernel.info()),
+            Query::Packet(kernel) => all.push(kernel.info()),
+        }
         all.extend(self.beam.iter().flat_map(Beam::pipelines));
         all
     }
 
-    /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
+    /// Queries of a map of surfaces, if there is one, whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
     /// of the map of events there.
     pub fn stage<'a>(
         &'a self,
         scene: &'a GpuScene,
-        map: &'a PhotonMap,
+        map: Option<&'a PhotonMap>,
         events: Option<EventsAsked<'a>>,
         scale: f64,
         (neighbors, radius): (u32, f64),

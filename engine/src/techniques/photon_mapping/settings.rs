@@ -143,6 +143,10 @@ crate::settings! {
         pub volume_transmittance: VolumeTransmittance = VolumeTransmittance::Walk;
         /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
+        /// Which of the other events of a medium, counted from the nearest, lies on the rim of a kernel in media by neighbours.
+        ///
+        /// The source has 85; others that compare kernels by neighbours in media have 117.
+        pub volume_neighbors: u32 = 85, in 1..=1000, unit "photons";
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.
         ///
         /// 0 stands for the radius of fixed kernels under which rays meet some tens of them, which a small picture of few photons finds out, at most a fiftieth of the scene's diagonal

@@ -195,7 +195,12 @@ impl PhotonTracer {
         let differentials = if has_differentials { slots } else { 1 };
         let work = |name, bytes: usize| gpu.buffer(&BufferDesc::storage(name, bytes as u64, Category::Work));
         let quarters = append.quarters();
-        let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
+        let capacity = if plan.stores_lights || scene.has_diffuse_base() {
+            (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32
+        } else {
+            // None is deposited, but there is no buffer of nothing.
+            1
+        };
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
         let volume = || VolumeTrace::new(gpu, &scene, &plan, media, slots);
         let volume = profile.media.any().then(volume).transpose()?;
@@ -376,7 +381,7 @@ impl PhotonTracer {
         if needed > most {
             return Err(Error::Overflow {
                 kernel: self.kit.append.name().into(),
-                what: self.kit.append.records().into(),
+                what: records_within_limit(&self.gpu, self.kit.append.records()),
                 needed,
                 capacity: most,
                 instead: self.kit.append.fewer().into(),
@@ -430,11 +435,23 @@ pub(super) fn flux_scale(scene: &GpuScene) -> f64 {
     if power > 0.0 { STORED_FLUX / power } else { 1.0 }
 }
 
-/// Records of so many quarters that a buffer of the device can hold.
-fn records_of_device(gpu: &Gpu, of_record: u32) -> u64 {
+/// Records of so many quarters that a buffer of the device can hold: 2²² of two where one has 128 MiB.
+pub(super) fn records_of_device(gpu: &Gpu, of_record: u32) -> u64 {
     let caps = gpu.caps();
     let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
     (quarters / u64::from(of_record)).min(u64::from(u32::MAX / 2))
+}
+
+/// What errors call records that are more than those: with the limit of the device's.
+pub(super) fn records_within_limit(gpu: &Gpu, records: &str) -> String {
+    let caps = gpu.caps();
+    let by_texels = caps.max_texel_buffer_elements < caps.max_storage_buffer_range / 16;
+    let limit = if by_texels {
+        "maxTexelBufferElements"
+    } else {
+        "maxStorageBufferRange"
+    };
+    format!("{records} within {limit}")
 }
 
 fn record_texels(gpu: &Gpu, records: u32, of_record: u32) -> Result<TexelView> {
