@@ -17,5 +17,6 @@ mod scenarios;
 pub mod volume_bandwidths;
 pub mod volume_dampening;
 pub mod volume_frame;
+pub mod volume_peers;
 pub mod volume_queues;
 pub mod volume_scenes;
