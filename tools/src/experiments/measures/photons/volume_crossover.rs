@@ -16,7 +16,7 @@ use crate::agreement::spread;
 use crate::experiments::findings::{Axes, Bound, Criterion, Findings, Measured, Study, curves, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::errors::mean_with_error;
-use crate::experiments::measures::pictures::finished;
+use crate::experiments::measures::pictures::{finished, mean_picture};
 use crate::experiments::plot::Curve;
 use crate::timing::timed;
 
@@ -253,7 +253,7 @@ fn rows_of(context: &Context<'_>, gpu: &Gpu, scattering: f64) -> Result<Vec<Row>
         .iter()
         .map(|turns| turns.iter().flatten().map(|(picture, _)| picture.clone()).collect())
         .collect();
-    let common = mean_picture(pictures.iter().flatten());
+    let common = mean_picture(pictures.iter().flatten().map(Vec::as_slice));
     let mut seen = Vec::new();
     for ((pictures, turns), mapper) in pictures.iter().zip(&turns).zip(&mappers) {
         let Some(found) = spread::measure(pictures, &common) else {
@@ -292,19 +292,6 @@ fn rows_of(context: &Context<'_>, gpu: &Gpu, scattering: f64) -> Result<Vec<Row>
     Ok(radii.iter().zip(kernels.as_chunks::<2>().0).map(row).collect())
 }
 
-/// The mean of pictures of one size, value by value; empty without any.
-fn mean_picture<'a>(pictures: impl Iterator<Item = &'a Vec<f32>>) -> Vec<f32> {
-    let (mut sums, mut count) = (Vec::new(), 0.0_f64);
-    for picture in pictures {
-        sums.resize(picture.len(), 0.0_f64);
-        for (sum, value) in sums.iter_mut().zip(picture) {
-            *sum += f64::from(*value);
-        }
-        count += 1.0;
-    }
-    sums.into_iter().map(|sum| (sum / count) as f32).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -339,6 +326,6 @@ mod tests {
         let in_time = beams.over_in_time(&collisions);
         assert!((in_time.value - 1.5).abs() < 1e-12);
         assert!((in_time.high - 1.5 - MARGIN * 1.5 * 0.02_f64.sqrt()).abs() < 1e-12);
-        assert_eq!(mean_picture([vec![1.0, 2.0], vec![3.0, 4.0]].iter()), [2.0, 3.0]);
+        assert_eq!(mean_picture([&[1.0, 2.0][..], &[3.0, 4.0]]), [2.0, 3.0]);
     }
 }
