@@ -22,16 +22,16 @@ use crate::experiments::unbiased;
 use crate::experiments::watch::render;
 
 /// Units that are tried beside the source's own, m; 0 for none.
-const TRIED: [f32; 4] = [0.0, 1.0, 2.5, 10.0];
+const TRIED: [f32; 6] = [0.0, 1.0, 1.5, 2.5, 4.0, 10.0];
 const SMOKE_TRIED: usize = 2;
 /// What is measured.
 const FULL: Form = Form {
     size: [32, 24],
-    share: 32,
+    share: 8,
     turns: 5,
     path_spp: 1024,
-    photons: 1 << 15,
-    passes: 48,
+    photons: 1 << 16,
+    passes: 64,
 };
 const SMOKE: Form = Form {
     size: [8, 6],
@@ -165,7 +165,7 @@ impl Study for Found {
                 geometric_mean(least.iter().map(|row| row.over_none.measured())),
             )
             .note(format!(
-                "Light that is seen in a medium of one pass of a 32nd of the source's photons, under its kernels, which are wider than its own by ∛32; {} × {} pixels, one sample each, {} \
+                "Light that is seen in a medium of one pass of an eighth of the source's photons, under its kernels, which are wider than its own by two; {} × {} pixels, one sample each, {} \
                  pictures, each with the same photons for all that are tried: {} m, and the source's. Dampening begins at that size of a footprint, so that the less it is the stronger it is. \
                  The source's were chosen by eye.",
                 FULL.size[0],
