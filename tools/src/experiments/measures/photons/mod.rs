@@ -15,6 +15,7 @@ pub mod photon_statistics;
 pub mod random_numbers;
 mod scenarios;
 pub mod volume_bandwidths;
+pub mod volume_choice;
 pub mod volume_crossover;
 pub mod volume_dampening;
 pub mod volume_frame;
