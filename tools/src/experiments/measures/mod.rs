@@ -192,8 +192,11 @@ measures! {
     on_device "upsampling" preview::upsampling;
     on_device "view-shadows" preview::view_shadows;
     on_device "volume-bandwidths" photons::volume_bandwidths;
+    on_device "volume-choice" photons::volume_choice;
+    on_device "volume-crossover" photons::volume_crossover;
     on_device "volume-dampening" photons::volume_dampening;
     on_device "volume-frame" photons::volume_frame;
+    on_device "volume-peers" photons::volume_peers;
     on_device "volume-scenes" photons::volume_scenes;
     on_device "volume-queues" photons::volume_queues;
     on_device "volume-transmittance" photons::volume_transmittance;

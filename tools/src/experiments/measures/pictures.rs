@@ -29,6 +29,19 @@ pub fn mean_of(values: &[f32]) -> f64 {
     values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64
 }
 
+/// The mean of pictures of one size, value by value; empty of none.
+pub fn mean_picture<'a>(pictures: impl IntoIterator<Item = &'a [f32]>) -> Vec<f32> {
+    let (mut sums, mut count) = (Vec::new(), 0.0_f64);
+    for picture in pictures {
+        sums.resize(picture.len(), 0.0_f64);
+        for (sum, value) in sums.iter_mut().zip(picture) {
+            *sum += f64::from(*value);
+        }
+        count += 1.0;
+    }
+    sums.into_iter().map(|sum| (sum / count) as f32).collect()
+}
+
 /// A picture with the variance of its means.
 pub struct Image {
     /// RGB a pixel.
