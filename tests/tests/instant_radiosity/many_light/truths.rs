@@ -272,7 +272,6 @@ fn walls_that_emit_bring_their_own_radiosity() {
         scene.place(cuboid("body", matte, lower, upper));
         scene.cameras = vec![orthographic(DVec3::Y * 0.9, DVec3::ZERO, -DVec3::Z, 0.2)];
         let settings = ManyLightSettings {
-            emitters: 64,
             sampler: SamplerKind::Sobol,
             ..of("bounces=1,lobes=diffuse+glossy", exact())
         };

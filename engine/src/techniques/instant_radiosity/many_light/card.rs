@@ -240,7 +240,7 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/truths.rs::a_virtual_light_lights_a_plane_as_its_law_says",
             "tests/tests/instant_radiosity/many_light/truths.rs::all_of_a_lights_power_arrives_on_the_plane",
             "tests/tests/instant_radiosity/many_light/truths.rs::squares_have_their_form_factors_behind_a_blocker",
-            "tests/tests/instant_radiosity/many_light/truths.rs::walls_that_emit_bring_their_own_radiosity",
+            "tests/tests/twins/edges.rs::faces_that_emit_bring_their_own_emission_inside",
             "tests/tests/instant_radiosity/many_light/truths.rs::errors_fall_with_the_root_of_the_lights",
             "tests/tests/instant_radiosity/many_light/bounces.rs::further_bounces_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/raster/gbuffer.rs::positions_project_to_the_middles_of_their_pixels",
@@ -267,6 +267,7 @@ const ROWS: &[Row] = &[
         tests: &[
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers",
             "tests/tests/instant_radiosity/many_light/truths.rs::points_light_a_plane_as_their_law_says",
+            "tests/tests/instant_radiosity/many_light/truths.rs::walls_that_emit_bring_their_own_radiosity",
             "tests/tests/instant_radiosity/many_light/truths.rs::all_of_a_lights_power_arrives_on_the_plane",
             "tests/tests/instant_radiosity/many_light.rs::direct_light_is_the_path_tracers_through_any_camera",
         ],
