@@ -437,6 +437,7 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/kept.rs::moved_lamps_renew_no_more_than_the_quota",
             "tests/tests/instant_radiosity/many_light/kept.rs::lamps_that_jump_lose_what_they_do_not_see",
             "tests/tests/instant_radiosity/many_light/kept.rs::kept_lights_have_all_of_the_power",
+            "tests/tests/instant_radiosity/many_light/kept.rs::the_same_walks_change_less_from_frame_to_frame",
             "tests/tests/instant_radiosity/many_light/kept.rs::means_over_seeds_are_the_path_tracers",
             "tests/tests/instant_radiosity/many_light/kept.rs::other_lights_are_refused",
         ],
