@@ -1,5 +1,5 @@
 //! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, their spikes, and orders in which points take them; on the device those that are kept from frame to frame,
-//! light that is, and what discs of reflective shadow maps have of it.
+//! light that is, what tells whether they are seen, and what discs of reflective shadow maps have of their light.
 
 pub mod deferred_stages;
 pub mod rsm_discs;
@@ -9,5 +9,6 @@ pub mod vpl_incremental;
 pub mod vpl_order;
 pub mod vpl_potential;
 mod vpl_shares;
+pub mod vpl_sight;
 pub mod vpl_spikes;
 pub mod vpl_walks;
