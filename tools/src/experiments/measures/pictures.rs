@@ -1,6 +1,7 @@
 //! Small pictures for measures.
 
 use clerestory::Result;
+use clerestory::film::png::Rgb8;
 use clerestory::film::z_test::{ZTest, z_test};
 use clerestory::film::{Picture, picture};
 use clerestory::render::{FrameReport, RenderOptions, Renderer};
@@ -27,6 +28,31 @@ pub fn mean(picture: &Picture) -> Result<f64> {
 /// The mean of values; 0 of none.
 pub fn mean_of(values: &[f32]) -> f64 {
     values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64
+}
+
+/// A small picture: a color for each pixel, row by row.
+pub type Panel = Vec<[u8; 3]>;
+
+/// Panels of one size in rows, black where a row has fewer than another, with so many pixels along a side for each of theirs.
+pub fn tiled([width, height]: [u32; 2], enlarged: u32, rows: &[Vec<Panel>]) -> Rgb8 {
+    let across = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let [width_shown, height_shown] = [width * enlarged, height * enlarged];
+    let mut bytes = Vec::new();
+    for row in rows {
+        for y in 0..height_shown {
+            for place in 0..across {
+                for x in 0..width_shown {
+                    let pixel = (y / enlarged * width + x / enlarged) as usize;
+                    bytes.extend(row.get(place).map_or([0; 3], |panel| panel[pixel]));
+                }
+            }
+        }
+    }
+    Rgb8 {
+        width: width_shown * across as u32,
+        height: height_shown * rows.len() as u32,
+        bytes,
+    }
 }
 
 /// A picture with the variance of its means.

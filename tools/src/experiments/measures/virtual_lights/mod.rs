@@ -7,6 +7,7 @@ mod unit_box;
 pub mod vpl_history;
 pub mod vpl_incremental;
 pub mod vpl_order;
+mod vpl_order_shown;
 pub mod vpl_potential;
 mod vpl_shares;
 pub mod vpl_sight;
