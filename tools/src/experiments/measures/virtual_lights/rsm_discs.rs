@@ -192,7 +192,7 @@ impl Study for Found {
             )
             .note(format!(
                 "{0} × {0} pixels, {1} frames with {2} samples of a disc, over the mean with {3} virtual lights a frame on the same views, which come through everything, too; as many seeds \
-                 as there are repeats. A point's views show what lies before them alone, so that discs lose what comes from behind their edges however large they are.",
+                 as there are repeats. A point's views show what lies before them alone, so that discs lose what comes from behind their edges however large they are; places beside a spot's cone are shown beside its view.",
                 FULL.side, FULL.frames, FULL.samples, FULL.lights
             ))
             .curves(
