@@ -123,6 +123,9 @@ mod tests {
         let page = &all.iter().find(|file| file.name == FILE).unwrap().text;
         let place = |words: &str| page.find(words).unwrap();
         let causes = place(CAUSE);
-        assert!(place("**undecided**") < causes && causes < place(experiment.about_in_short()), "{page}");
+        assert!(
+            place("**undecided**") < causes && causes < place(experiment.about_in_short()),
+            "{page}"
+        );
     }
 }
