@@ -1,6 +1,7 @@
 //! Virtual lights: on the host, in the unit box of the digest, their walks, their potential, their spikes, and orders in which points take them; on the device those that are kept from frame to frame,
 //! light that is, what tells whether they are seen, and what discs of reflective shadow maps have of their light.
 
+mod deferred_pictures;
 pub mod deferred_stages;
 pub mod rsm_discs;
 mod unit_box;
