@@ -5,6 +5,7 @@ use clerestory::film::png::Rgb8;
 use clerestory::film::z_test::{ZTest, z_test};
 use clerestory::film::{Picture, picture};
 use clerestory::render::{FrameReport, RenderOptions, Renderer};
+use clerestory::srgb::srgb_byte;
 use clerestory::techniques::Technique;
 use serde_json::json;
 
@@ -32,6 +33,12 @@ pub fn mean_of(values: &[f32]) -> f64 {
 
 /// A small picture: a color for each pixel, row by row.
 pub type Panel = Vec<[u8; 3]>;
+
+/// Light, RGB a pixel, up to what is white.
+pub fn light_panel(radiance: &[f32], white: f64) -> Panel {
+    let color = |pixel: &[f32; 3]| pixel.map(|value| srgb_byte(f64::from(value) / white));
+    radiance.as_chunks::<3>().0.iter().map(color).collect()
+}
 
 /// Panels of one size in rows, black where a row has fewer than another, with so many pixels along a side for each of theirs.
 pub fn tiled([width, height]: [u32; 2], enlarged: u32, rows: &[Vec<Panel>]) -> Rgb8 {

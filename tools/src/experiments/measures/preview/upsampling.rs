@@ -11,7 +11,6 @@ use clerestory::gpu::{Access, Area, Category, Gpu};
 use clerestory::raster::upsample::{UpsampleDesc, UpsampledPicture, Upsampler};
 use clerestory::raster::{GBuffer, GBufferDesc, Layering, Output, View};
 use clerestory::scene::{Scene, SceneProfile};
-use clerestory::srgb::srgb_byte;
 use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings};
 use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
@@ -19,7 +18,7 @@ use glam::DVec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::pictures::{Panel, finished, mean_of, tiled};
+use crate::experiments::measures::pictures::{Panel, finished, light_panel, mean_of, tiled};
 use crate::experiments::reference::short_name;
 
 const SCENES: [&str; 3] = ["builtin:cornell-box", "builtin:box-room", "builtin:conference"];
@@ -163,8 +162,7 @@ fn error(found: &UpsampledPicture, sound: &[bool], truth: &[[f32; 3]]) -> f64 {
 
 /// Light up to a brightness, with what is defective marked.
 fn panel(values: &[[f32; 3]], defective: &[bool], white: f64) -> Panel {
-    let color = |value: &[f32; 3]| value.map(|channel| srgb_byte(f64::from(channel) / white));
-    let mut panel: Panel = values.iter().map(color).collect();
+    let mut panel = light_panel(values.as_flattened(), white);
     for (color, _) in panel.iter_mut().zip(defective).filter(|(_, defective)| **defective) {
         *color = DEFECTIVE;
     }

@@ -10,6 +10,7 @@ pub mod vpl_incremental;
 pub mod vpl_order;
 mod vpl_order_shown;
 pub mod vpl_potential;
+mod vpl_receiver;
 mod vpl_shares;
 pub mod vpl_sight;
 pub mod vpl_spikes;
