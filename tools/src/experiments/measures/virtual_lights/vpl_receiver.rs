@@ -58,7 +58,7 @@ pub fn findings(receivers: &[Receiver]) -> Findings {
 ///
 /// # Errors
 /// Those of the scene and of rendering.
-pub fn measure(gpu: &Gpu, form: Form) -> Result<(Receiver, Vec<Panel>)> {
+pub(super) fn measure(gpu: &Gpu, form: Form) -> Result<(Receiver, Vec<Panel>)> {
     let (_, _, start, _) = SCENES[0];
     let subject = Subject::new((SCENE, false, start, Vec3::ZERO))?;
     let body = subject
