@@ -3,7 +3,7 @@
 use super::*;
 use clerestory::Error;
 use clerestory::gpu::{GpuOptions, Lesser};
-use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase, Projection};
+use clerestory::scene::{Camera, DensityGrid, Medium, Phase, Projection};
 use clerestory::techniques::photon_mapping::volume::event::{EventWords, PhotonEvent};
 use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
 use clerestory::techniques::photon_mapping::{MapBuild, MappedEvent};
@@ -72,7 +72,7 @@ pub(super) fn uneven(mut medium: Medium) -> Medium {
     medium
 }
 
-fn all_events(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, pass: u32) -> (Vec<MappedEvent>, MapperCounts) {
+pub(super) fn all_events(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, pass: u32) -> (Vec<MappedEvent>, MapperCounts) {
     let mut mapper = mapper(gpu, scene, settings);
     let events = mapper.events(pass).unwrap_or_else(|error| panic!("{error}"));
     (events, mapper.counts())

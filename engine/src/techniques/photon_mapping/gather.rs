@@ -275,11 +275,11 @@ fn states_before_rough(eye: &PathSet) -> u32 {
     let mut reached = 1u32;
     loop {
         let before = reached;
-        for (state, word) in successors
+        let reached_before = successors
             .iter()
             .enumerate()
-            .filter(|(state, _)| before >> state & 1 != 0)
-        {
+            .filter(|(state, _)| before >> state & 1 != 0);
+        for (_, word) in reached_before {
             for symbol in 0..PATH_SET_LOBE_COUNT {
                 let after = word >> (PATH_SET_STATE_BITS * symbol) & PATH_SET_DEAD;
                 if 1 << symbol & (LOBE_SPECULAR | LOBE_GLOSSY) != 0 && after != PATH_SET_DEAD {

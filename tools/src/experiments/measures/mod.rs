@@ -204,6 +204,7 @@ measures! {
     on_device "vpl-incremental" virtual_lights::vpl_incremental;
     on_host "vpl-order" virtual_lights::vpl_order;
     on_device "vpl-potential" virtual_lights::vpl_potential;
+    on_device "vpl-sight" virtual_lights::vpl_sight;
     on_host "vpl-spikes" virtual_lights::vpl_spikes;
     on_host "vpl-walks" virtual_lights::vpl_walks;
     on_host "vpl-warp" preview::vpl_warp;
