@@ -79,7 +79,7 @@ const CRITERIA: &[Criterion<Row>] = &[
         |row: &Row| row.spike.into(),
     )
     .among(|row| row.distance == TWENTIETH)
-    .because("the digest's three seeds"),
+    .because("the three seeds of the figures computed elsewhere"),
     Criterion::each(
         "a fifth of the box leaves 1.03: greatest pixel over the 99th percentile",
         Bound::AtMost(1.1),
