@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 
+use super::collisions::{CollisionPass, CollisionStage};
 use super::glow::GlowStage;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
@@ -123,6 +124,11 @@ pub(in crate::techniques) trait Append: Send {
     fn fewer(&self) -> &'static str;
 
     fn pipeline(&self) -> PipelineInfo;
+
+    /// What walks do on their ways through media where their collisions become records as well; none where the tracer's own stages do it.
+    fn collisions(&self) -> Option<&dyn CollisionStage> {
+        None
+    }
 
     /// Records what makes those that wait into records behind `first` and the wave's earlier ones, as far as there is room for `capacity`.
     ///
@@ -263,7 +269,7 @@ struct Kit {
     emission: Option<TexelView>,
     /// Only where media emit.
     glow: Option<GlowStage>,
-    /// Only in scenes with media.
+    /// Only in scenes with media, unless `append` has a stage for collisions.
     volume: Option<VolumeTrace>,
     /// Of expressions: successors of classes, and those by scattering in media.
     classes: Option<(Buffer, [u32; 2])>,
@@ -342,7 +348,8 @@ impl PhotonTracer {
         let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
         let volume = || VolumeTrace::new(gpu, &scene, &plan, media, slots);
-        let volume = profile.media.any().then(volume).transpose()?;
+        let has_volume = profile.media.any() && append.collisions().is_none();
+        let volume = has_volume.then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
             kit: Kit {
@@ -407,6 +414,7 @@ impl PhotonTracer {
             Some(volume) => all.extend(volume.pipelines()),
             None => all.push(kit.append.pipeline()),
         }
+        all.extend(kit.append.collisions().map(CollisionStage::pipeline));
         all.extend(self.walker.trace_pipelines());
         all.extend(self.walker.compaction_pipelines());
         all
@@ -484,6 +492,8 @@ impl PhotonTracer {
         let traced = &mut tracing.traced;
         let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
         let [absorbed, events] = volume.unwrap_or_default();
+        let collided = self.kit.append.collisions().map(CollisionStage::counts).transpose()?;
+        let [collided, kept] = collided.unwrap_or_default();
         // What waits are the deposits with a kernel, and in scenes with media what comes from these besides.
         let records = match volume {
             Some(_) => counters.deposits - counters.without_kernel,
@@ -491,11 +501,11 @@ impl PhotonTracer {
         };
         traced.records = traced.records.saturating_add(records);
         traced.events = traced.events.saturating_add(events);
-        traced.counts.events += u64::from(events);
+        traced.counts.events += u64::from(events) + u64::from(kept);
         traced.counts.collisions += walked.media.collisions;
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
-        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed);
+        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed) + u64::from(collided);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
@@ -578,6 +588,8 @@ impl PhotonStages<'_> {
 impl WalkStages for PhotonStages<'_> {
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
         self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.reset(pass))?;
+        let collisions = self.kit.append.collisions();
+        collisions.map_or(Ok(()), |stage| stage.reset(pass))?;
         pass.fill(self.kit.counters.view(), 0)
     }
 
@@ -612,6 +624,16 @@ impl WalkStages for PhotonStages<'_> {
             };
             recorder.pass("photon: medium", |pass| {
                 volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)
+            })?;
+        }
+        if let Some(collisions) = kit.append.collisions() {
+            let told = CollisionPass {
+                key: self.key,
+                first_deposit: kit.stored.first_bounce,
+                last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
+            };
+            recorder.pass("photon: medium", |pass| {
+                collisions.record(pass, bounce, &kit.scene, told)
             })?;
         }
         let push = photon_scatter::Push {
@@ -671,6 +693,8 @@ impl WalkStages for PhotonStages<'_> {
             .volume
             .as_ref()
             .map_or(Ok(()), |volume| volume.read_back(pass))?;
+        let collisions = self.kit.append.collisions();
+        collisions.map_or(Ok(()), |stage| stage.read_back(pass))?;
         pass.copy(self.kit.counters.view(), self.kit.counters_readback.view())
     }
 }

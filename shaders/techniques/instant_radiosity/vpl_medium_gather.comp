@@ -1,0 +1,272 @@
+#version 460
+// Radiance from the virtual lights of a pass in scenes with homogeneous media: where eye paths have arrived at surfaces that scatter into more than one direction, or where
+// they collide on the way there. From all lights, on surfaces and at collisions, with a shadow ray that passes boundaries and brings what the media let through.
+//
+// Collisions are those of free flights of eye paths (techniques/path/path_medium.comp), by the same random numbers: a ray gathers at its collision or at its surface, never at both,
+// with the weight that flights have. Beyond the bound of the geometry term the light is the eye paths' own, whose ways go on.
+//
+// An invocation is for a place, and takes the lights in their order, so many stretches of shadow rays a dispatch. A place that has not had all of them, or whose ray a quota
+// stops, notes where it is, marks itself and stalls the wave; further dispatches go on there, as in vpl_gather.comp.
+//
+// CL-VPL-MEDIA: A. Keller, "Instant Radiosity", 1997, in media; T. Kollig and A. Keller, "Illumination in the Presence of Weak Singularities", 2006.
+// Deterministic: a path's sum has the order of the lights.
+// variant: driver
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+layout(local_size_x = 64) in;
+
+#include "transport/features.glsl"
+#include "walk/wave.glsl"
+#include "transport/path_set.glsl"
+#include "walk/media.glsl"
+#include "wide_counter.glsl"
+
+layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
+layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // stretches of shadow rays of a place, in a dispatch
+
+layout(push_constant, scalar) uniform Push {
+    vec3 scene_lower;
+    uint states;         // of a path that gathers where it is scattered, a bit each
+    vec3 scene_upper;
+    uint least_bounces;  // scatterings in all
+    WalkKey key;
+    uint most_bounces;
+    uint lights;
+    float scale;         // one over the walks of the pass
+    float edge_bound;    // of EDGE_BOUND
+    uint seed;           // of the pass
+    uint first_place;
+    uint goes_on;        // 1 for places that have stopped
+    uint surrounding;    // index of the medium outside all bodies, or NO_MEDIUM
+} push;
+
+// What a place has had of the lights, where it goes on.
+struct MediumGatherState {
+    vec3 sum;
+    uint light;          // the next one, or whose ray is under way
+    vec3 transmittance;  // of that ray so far
+    uint cursor;         // where the search of its next surface goes on
+    Hit hit;
+    float start;         // as in ShadowState
+    uint interior;       // body that the stretch is in, or OUTSIDE
+    uint begun;          // 1 where a ray is under way
+};
+
+layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
+layout(set = 3, binding = 1, scalar) restrict buffer MediumGatherStates { MediumGatherState medium_gather_states[]; };  // by place
+// As in gather_place.glsl.
+layout(set = 3, binding = 2, scalar) restrict buffer VirtualLightCounters {
+    uint gathers;
+    uint remaining;
+    uint connections[2];
+    uint shadow_rays[2];
+    uint nodes[2];
+} gather_counters;
+layout(set = 3, binding = 3, scalar) restrict readonly buffer LightDepartures { float departures[]; };  // path_departures, by slot
+layout(set = 3, binding = 4) uniform utextureBuffer gather_media;                                       // records of media
+
+#include "techniques/instant_radiosity/medium_connection.glsl"
+#include "walk/draws.glsl"
+#include "walk/candidate_alpha.glsl"
+
+#define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
+#include "accel/index.glsl"
+
+// Stand in walk_resume for a place that goes on in a later dispatch, and for one that has no light to gather or is done.
+const uint GATHER_STOPPED = 0xFFFFFFFEu;
+const uint GATHER_DONE = 0xFFFFFFFCu;
+// Tells the candidates of these rays from those of the paths' own.
+const uint GATHER_SEED = 0x76706c73u;
+
+// Whether the picture has what is scattered so often between a light source and the eye.
+bool counts_bounces(uint bounces) { return !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces); }
+
+// What virtual lights leave to be gathered at a distance of t from where the path was scattered last, whose light they have up to the bound.
+float gathered_share(uint slot, WalkState path, float cos_here, float t) {
+    if (EDGE_BOUND == EDGE_UNBOUNDED || !(path.pdf > 0.0)) {
+        return 1.0;
+    }
+    float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
+    return 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, t * t);
+}
+
+// Prepares the receiver of a place; false where nothing is gathered.
+bool begin_receiver(uint slot, uint place, out MediumReceiver r) {
+    WalkState path = load_walk(slot);
+    Hit hit = load_hit(place);
+    uint state = HAS_PATH_AUTOMATON ? path_set_state(path.bounce) : 0u;
+    r.at.bounce = HAS_PATH_AUTOMATON ? path_set_bounce(path.bounce) : path.bounce;
+    // A light and the receiver scatter once more each.
+    if ((push.states >> state & 1u) == 0u || (COUNTS_BOUNCES && r.at.bounce + 2u > push.most_bounces)) {
+        return false;
+    }
+    MediumState at = MediumState(vec3(1.0 / 3.0), 0.0);
+    if (status.rounds > 0u) {
+        at = walk_medium_states[slot];
+    }
+    bool met = hit.triangle != NO_HIT;
+    Crossing crossing = Crossing(OUTSIDE, OUTSIDE, false);
+    if (met) {
+        crossing = cross_surface(hit.triangle, path.direction, walk_gathered[slot].interior);
+    }
+    float end = met ? max(hit.t, at.start) : FAR_AWAY;
+    vec3 weight = vec3(1.0);
+    r.medium = NO_MEDIUM;
+    r.at.interior = crossing.interior;
+    uint medium = medium_inside(crossing.interior, push.surrounding);
+    if (medium != NO_MEDIUM && end > at.start) {
+        GatherMedium m = load_gather_medium(medium);
+        float t_max = end >= FAR_AWAY ? FAR_AWAY : end - at.start;
+        if (m.sigma_s == vec3(0.0)) {
+            weight = transmittance(m.sigma_t, t_max);
+        } else {
+            Sampler s = walk_sampler(slot, DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot));
+            FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, at.bands, t_max, sample_2d(s));
+            weight = flight.weight;
+            if (flight.collides) {
+                float t = max(at.start + flight.t, 0.0);
+                r.medium = medium;
+                r.at.arrival.surface.point = SurfacePoint(path.origin + t * path.direction, vec3(0.0));
+                r.at.arrival.wo = -path.direction;
+                r.at.throughput = path.throughput * weight * gathered_share(slot, path, 1.0, t);
+                return r.at.throughput != vec3(0.0);
+            }
+        }
+    }
+    if (!met || crossing.boundary) {
+        return false;
+    }
+    r.at.arrival = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
+    if (arrival_is_unlit(r.at.arrival) || !arrival_has_rough_lobes(r.at.arrival)) {
+        return false;
+    }
+    if (HAS_ABSORPTION && crossing.interior != OUTSIDE) {
+        weight *= exp(-load_material(crossing.interior).absorption * (end - max(at.start, 0.0)));
+    }
+    r.at.interior = arrival_interior(r.at.arrival, crossing.interior);
+    float cos_here = abs(dot(path.direction, r.at.arrival.surface.geometric_normal));
+    r.at.throughput = path.throughput * weight * gathered_share(slot, path, cos_here, hit.t);
+    r.at.frame = scattering_frame(r.at.arrival, arrival_normal(r.at.arrival));
+    return r.at.throughput != vec3(0.0);
+}
+
+// Random words that alpha is drawn by on the way to a light. The point and the way to it stand for the path.
+uvec4 connection_words(MediumReceiver r, uint number) {
+    uvec3 place = floatBitsToUint(r.at.arrival.surface.point.position);
+    uvec3 way = floatBitsToUint(r.at.arrival.wo);
+    return pcg4d(uvec4(place, push.seed)) + pcg4d(uvec4(way.x ^ number, way.y, way.z + r.at.bounce, GATHER_SEED));
+}
+
+// Takes the stretch up to the next surface, to which the way has been searched; true when the ray has ended, its transmittance known.
+bool pass_stretch(Ray ray, inout MediumGatherState at) {
+    bool met = at.hit.triangle != NO_HIT;
+    Crossing crossing = Crossing(at.interior, OUTSIDE, false);
+    if (met) {
+        crossing = cross_surface(at.hit.triangle, ray.direction, at.interior);
+        if (!crossing.boundary) {
+            at.transmittance = vec3(0.0);
+            return true;
+        }
+    }
+    float way = max(at.hit.t - at.start, 0.0) * length(ray.direction);
+    uint medium = medium_inside(crossing.interior, push.surrounding);
+    if (medium != NO_MEDIUM) {
+        at.transmittance *= transmittance(load_gather_medium(medium).sigma_t, way);
+    }
+    if (HAS_ABSORPTION && crossing.interior != OUTSIDE) {
+        at.transmittance *= transmittance(load_material(crossing.interior).absorption, way);
+    }
+    at.start = past_surface(at.hit.t);
+    at.interior = crossing.beyond;
+    at.cursor = INDEX_START;
+    at.hit = no_hit(ray.t_max);
+    return !met || at.transmittance == vec3(0.0);
+}
+
+// Goes on with the lights of a place.
+void gather(MediumReceiver r, inout MediumGatherState at, out uint rays) {
+    rays = 0u;
+    bool stopped = false;
+    for (uint stretch = 0u; stretch < LIGHTS_AT_ONCE && at.light < push.lights && !stopped; ++stretch) {
+        MediumLight l = load_medium_light(at.light);
+        ShadowWay shadow;
+        vec3 found = medium_connection(r, l, shadow);
+        found = counts_bounces(r.at.bounce + l.light.bounce + 2u) ? found : vec3(0.0);
+        bool ended = found == vec3(0.0);
+        if (!ended) {
+            if (at.begun == 0u) {
+                ++rays;
+                at.begun = 1u;
+                at.transmittance = vec3(1.0);
+                at.cursor = INDEX_START;
+                at.hit = no_hit(shadow.ray.t_max);
+                at.start = shadow.start;
+                at.interior = shadow.interior;
+            }
+            if (HAS_ALPHA) {
+                candidate_key = connection_words(r, at.light);
+            }
+            Ray rest = Ray(shadow.ray.origin, search_start(at.start), shadow.ray.direction, shadow.ray.t_max);
+            at.cursor = closest_hit(rest, at.cursor, at.hit);
+            stopped = at.cursor != INDEX_FINISHED;
+            if (!stopped) {
+                ended = pass_stretch(shadow.ray, at);
+                at.sum += ended ? found * at.transmittance : vec3(0.0);
+            }
+        }
+        if (ended) {
+            at.begun = 0u;
+            ++at.light;
+        }
+    }
+}
+
+void main() {
+    uint place = push.first_place + gl_GlobalInvocationID.x;
+    if (status.stalled == STALLED_EXTEND || status.stalled == STALLED_SHADOW || place >= status.active_count) {
+        return;
+    }
+    bool goes_on = push.goes_on != 0u;
+    uint resume = walk_resume[place];
+    if (goes_on ? resume != GATHER_STOPPED : resume == GATHER_STOPPED || resume == GATHER_DONE) {
+        return;
+    }
+    if (!goes_on && !has_work_left()) {
+        leave_for_later(STALLED_ARRIVAL);
+        return;
+    }
+    walk_resume[place] = GATHER_DONE;
+    uint slot = load_slot(place);
+    MediumReceiver r;
+    if (!begin_receiver(slot, place, r)) {
+        return;
+    }
+    MediumGatherState at =
+        MediumGatherState(vec3(0.0), 0u, vec3(1.0), INDEX_START, no_hit(0.0), 0.0, OUTSIDE, 0u);
+    if (goes_on) {
+        at = medium_gather_states[place];
+    } else {
+        atomicAdd(gather_counters.gathers, 1u);
+    }
+    uint first = at.light;
+    uint rays;
+    gather(r, at, rays);
+    COUNT_WIDE(gather_counters.connections, at.light - first)
+    COUNT_WIDE(gather_counters.shadow_rays, rays)
+    if (!goes_on) {
+        count_work(index_iterations + CONNECTION_ITERATIONS * LIGHTS_AT_ONCE, WORK_UNIT);
+    }
+    if (at.light == push.lights) {
+        walk_gathered[slot].radiance += r.at.throughput * at.sum * push.scale;
+        return;
+    }
+    medium_gather_states[place] = at;
+    walk_resume[place] = GATHER_STOPPED;
+    if (goes_on) {
+        atomicAdd(gather_counters.remaining, 1u);
+    } else {
+        atomicAdd(status.unfinished, 1u);
+        atomicMax(status.stalled, STALLED_ARRIVAL);
+    }
+}
