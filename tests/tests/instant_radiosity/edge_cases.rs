@@ -220,7 +220,7 @@ fn what_cannot_be_modelled_is_refused_by_name() {
     with_gpu(|gpu| {
         let mut unlit = room();
         unlit.materials[0].unlit = true;
-        for (scene, word) in [(builtin("builtin:fog-box"), "media"), (unlit, "unlit")] {
+        for (scene, word) in [(builtin("builtin:smoke"), "media"), (unlit, "unlit")] {
             let options = RenderOptions {
                 technique: Some("vpl".into()),
                 ..RenderOptions::default()

@@ -124,7 +124,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-VPL-MEDIA",
     name: "virtual lights in homogeneous media: collisions of walks, with the phase function as their lobe, that light surfaces and collisions of eye paths through what media let through",
     role: Role::PartOf("SVO-G0"),
-    limits: "Media with a density grid are refused, as are light from infinity in an endless medium, cuts, shares of the potential and fractional walks; light that a mirror sends into a medium is found by eye paths alone; without a bound the variance of lights near a collision has no bound either.",
+    limits: "Media with a density grid are refused, as are light from infinity in an endless medium, cuts, shares of the potential, fractional walks and steps of compensation; light that a mirror sends into a medium is found by eye paths alone; without a bound the variance of lights near a collision has no bound either.",
     sources: &[sources::KELLER_1997.whole(), sources::KOLLIG_KELLER_2006.whole()],
     shaders: &[
         "shaders/techniques/instant_radiosity/vpl_medium.comp",
@@ -138,9 +138,11 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "tests/tests/instant_radiosity/media.rs::lights_at_collisions_agree_with_the_path_tracer",
         "tests/tests/instant_radiosity/media.rs::bounds_in_media_are_compensated",
+        "tests/tests/instant_radiosity/media.rs::furnaces_with_fog_are_even",
         "tests/tests/instant_radiosity/media.rs::light_off_mirrors_into_media_is_the_eye_paths",
         "tests/tests/instant_radiosity/media.rs::walks_through_media_are_counted",
         "tests/tests/instant_radiosity/media.rs::pictures_of_media_do_not_depend_on_how_work_is_shared_out",
+        "tests/tests/instant_radiosity/media.rs::threads_of_the_driver_never_show_in_media",
         "tests/tests/instant_radiosity/media.rs::what_media_have_no_lights_for_is_refused_by_name",
         "engine/src/techniques/instant_radiosity/settings.rs::eye_paths_in_media_also_have_what_mirrors_send_there",
     ],
