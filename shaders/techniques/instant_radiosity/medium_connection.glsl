@@ -1,30 +1,15 @@
-// What a virtual light brings to a point in scenes with homogeneous media, each of them on a surface or at a collision: as in connection.glsl, with the phase function and
+// What a virtual light brings to a point in scenes with media, each of them on a surface or at a collision: as in connection.glsl, with the phase function and
 // without a cosine at a collision. What the media let through, and whether anything stands between, is the includer's.
 //
 // CL-VPL-MEDIA: A. Keller, "Instant Radiosity", 1997, in media; bounds as T. Kollig and A. Keller, "Illumination in the Presence of Weak Singularities", 2006.
-// Expects what connection.glsl does, and, declared before the inclusion, the texel buffer `gather_media` of the media's records.
+// Expects what connection.glsl does, and the media of scene/media.glsl.
 #ifndef CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_MEDIUM_CONNECTION_GLSL
 #define CLERESTORY_TECHNIQUES_INSTANT_RADIOSITY_MEDIUM_CONNECTION_GLSL
 
 #include "techniques/instant_radiosity/collision_light.glsl"
 #include "techniques/instant_radiosity/connection.glsl"
-#include "transport/medium.glsl"
+#include "scene/media.glsl"
 #include "transport/phase.glsl"
-
-// What a homogeneous medium does to light that passes.
-struct GatherMedium {
-    vec3 sigma_s;  // 1/m
-    uint phase;
-    vec3 sigma_t;  // 1/m
-    float phase_parameter;
-};
-
-GatherMedium load_gather_medium(uint index) {
-    int first = int(MEDIUM_QUARTERS * index);
-    uvec4 q0 = texelFetch(gather_media, first);
-    uvec4 q1 = texelFetch(gather_media, first + 1);
-    return GatherMedium(uintBitsToFloat(q0.xyz), q0.w, uintBitsToFloat(q1.xyz), uintBitsToFloat(q1.w));
-}
 
 // A point that virtual lights light: of a collision the position, the way there and the body are known alone, and the frame is none.
 struct MediumReceiver {
@@ -41,7 +26,7 @@ struct ShadowWay {
 
 // Density per sr with which a medium scatters between propagation directions.
 float medium_scattering(uint medium, vec3 w, vec3 wi) {
-    GatherMedium m = load_gather_medium(medium);
+    SceneMedium m = load_medium(medium);
     return phase_function(m.phase, m.phase_parameter, w, wi);
 }
 

@@ -1,8 +1,8 @@
 #version 460
-// Walks from the lights on their ways through homogeneous media: free flight to a collision, which waits as a virtual light and is scattered, or absorbed; on through a
+// Walks from the lights on their ways through media: free flight to a collision, which waits as a virtual light and is scattered, or absorbed; on through a
 // boundary; or with what is left of the power to the surface, for photon_scatter.comp.
 //
-// Free flights are those of eye paths (transport/medium.glsl), one walk for all bands. A collision keeps the power that it scatters; the walk goes on with the
+// Free flights are those of eye paths (transport/medium.glsl, transport/media_tracking.glsl): analytic in homogeneous media, delta tracking in grids, one walk for all bands. A collision keeps the power that it scatters; the walk goes on with the
 // probability that leaves its largest band as it is. Where a medium scatters nothing there are no collisions, and power is weighted by the transmittance instead.
 //
 // CL-VPL-MEDIA: A. Keller, "Instant Radiosity", 1997, in media. Deterministic in (seed, pass, walk).
@@ -12,8 +12,8 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
+#include "transport/media_features.glsl"
 #include "techniques/photon_mapping/photon_history.glsl"
-#include "scene/media.glsl"
 #include "transport/path_set.glsl"
 #include "walk/media.glsl"
 #include "walk/wave.glsl"
@@ -32,7 +32,7 @@ layout(set = 1, binding = 0, scalar) restrict buffer CollisionCounters {
 
 #include "walk/draws.glsl"
 #include "transport/bodies.glsl"
-#include "transport/medium.glsl"
+#include "transport/media_tracking.glsl"
 #include "transport/phase.glsl"
 #include "walk/survival.glsl"
 
@@ -68,6 +68,16 @@ void main() {
     if (status.stalled != STALLED_NOT || place >= status.active_count) {
         return;
     }
+    if (HAS_GRIDS) {
+        if (walk_resume[place] == PLACE_SCATTERED) {
+            return;
+        }
+        if (!has_work_left()) {
+            leave_for_later(STALLED_SCATTER);
+            return;
+        }
+        walk_resume[place] = PLACE_SCATTERED;
+    }
     uint slot = load_slot(place);
     WalkState walk = load_walk(slot);
     uint bounce = path_set_bounce(walk.bounce);
@@ -83,25 +93,42 @@ void main() {
     float end = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, state.start);
     uint medium = medium_inside(crossing.interior, push.surrounding);
     vec3 weight = vec3(1.0);
-    bool collides = false;
+    uint outcome = GRID_LEFT;
     SceneMedium m;
-    float t = 0.0;  // of a collision, along the ray
+    float t = 0.0;  // of a collision, or of a stop, along the ray
     if (medium != NO_MEDIUM && end > state.start) {
         m = load_medium(medium);
-        float t_max = end >= FAR_AWAY ? FAR_AWAY : end - state.start;
-        if (m.sigma_s == vec3(0.0)) {
-            weight = transmittance(m.sigma_t, t_max);
-        } else {
-            Sampler s = walk_sampler(slot, DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot));
-            FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, state.bands, t_max, sample_2d(s));
-            weight = flight.weight;
-            state.bands = flight.bands;
-            collides = flight.collides;
-            t = state.start + flight.t;
+        bool passes = m.sigma_s == vec3(0.0);
+        uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
+        if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
+            float t_max = end >= FAR_AWAY ? FAR_AWAY : end - state.start;
+            if (passes) {
+                weight = transmittance(m.sigma_t, t_max);
+            } else {
+                Sampler s = walk_sampler(slot, dimension);
+                FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, state.bands, t_max, sample_2d(s));
+                weight = flight.weight;
+                state.bands = flight.bands;
+                outcome = flight.collides ? GRID_COLLIDED : GRID_LEFT;
+                t = state.start + flight.t;
+            }
+        } else if (HAS_GRIDS) {
+            uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
+            GridWalk grid = begin_grid_walk(m, walk.origin, walk.direction, state.start, end);
+            vec3 emitted = vec3(0.0);
+            outcome = delta_tracking(m, key, vec3(0.0), passes, grid, state.bands, weight, emitted);
+            t = grid.entry + grid.t;
+            float reached = resumed_start(state.start, t);
+            // The search that goes on from the surface itself would miss it.
+            outcome = outcome == GRID_STOPPED && reached >= end ? GRID_LEFT : outcome;
+            t = outcome == GRID_STOPPED ? reached : t;
+            COUNT_MEDIUM(null_collisions, grid.nulls)
+            COUNT_MEDIUM(density_lookups, grid.nulls + (outcome == GRID_COLLIDED ? 1u : 0u))
+            count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
         }
-        COUNT_MEDIUM(collisions, collides ? 1u : 0u)
+        COUNT_MEDIUM(collisions, outcome == GRID_COLLIDED ? 1u : 0u)
     }
-    if (HAS_ABSORPTION && crossing.interior != OUTSIDE && !collides) {
+    if (HAS_ABSORPTION && crossing.interior != OUTSIDE && outcome == GRID_LEFT) {
         weight *= exp(-load_material(crossing.interior).absorption * (end - max(state.start, 0.0)));
     }
     bool handled = true;
@@ -110,7 +137,7 @@ void main() {
     uint interior = crossing.interior;
     vec3 before = walk.throughput;
     walk.throughput *= weight;
-    if (collides) {
+    if (outcome == GRID_COLLIDED) {
         if (walk.throughput != vec3(0.0)) {
             // What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
             vec3 at = walk.origin + max(t, 0.0) * walk.direction;
@@ -120,6 +147,9 @@ void main() {
             alive = scatter(slot, m, before, at, bounce, walk);
             state.start = 0.0;
         }
+    } else if (outcome == GRID_STOPPED) {
+        state.start = t;
+        alive = walk.throughput != vec3(0.0);
     } else if (crossing.boundary) {
         state.start = past_surface(hit.t);
         interior = crossing.beyond;

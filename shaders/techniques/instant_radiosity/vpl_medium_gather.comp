@@ -1,9 +1,9 @@
 #version 460
-// Radiance from the virtual lights of a pass in scenes with homogeneous media: where eye paths have arrived at surfaces that scatter into more than one direction, or where
+// Radiance from the virtual lights of a pass in scenes with media: where eye paths have arrived at surfaces that scatter into more than one direction, or where
 // they collide on the way there. From all lights, on surfaces and at collisions, with a shadow ray that passes boundaries and brings what the media let through.
 //
 // Collisions are those of free flights of eye paths (techniques/path/path_medium.comp), by the same random numbers: a ray gathers at its collision or at its surface, never at both,
-// with the weight that flights have. Beyond the bound of the geometry term the light is the eye paths' own, whose ways go on.
+// with the weight that flights have; one that stops in a grid gathers where its path goes on. Shadow rays weigh homogeneous media in closed form and grids by ratio tracking. Beyond the bound of the geometry term the light is the eye paths' own, whose ways go on.
 //
 // An invocation is for a place, and takes the lights in their order, so many stretches of shadow rays a dispatch. A place that has not had all of them, or whose ray a quota
 // stops, notes where it is, marks itself and stalls the wave; further dispatches go on there, as in vpl_gather.comp.
@@ -17,11 +17,13 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
+#include "transport/media_features.glsl"
 #include "walk/wave.glsl"
 #include "transport/path_set.glsl"
 #include "walk/media.glsl"
 #include "wide_counter.glsl"
 
+layout(constant_id = 22) const bool HAS_AIRLIGHT = true;     // eye paths take equi-angular samples
 layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
 layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // stretches of shadow rays of a place, in a dispatch
 
@@ -51,6 +53,7 @@ struct MediumGatherState {
     float start;         // as in ShadowState
     uint interior;       // body that the stretch is in, or OUTSIDE
     uint begun;          // 1 where a ray is under way
+    uint grid_walks;     // of that ray so far
 };
 
 layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
@@ -64,10 +67,15 @@ layout(set = 3, binding = 2, scalar) restrict buffer VirtualLightCounters {
     uint nodes[2];
 } gather_counters;
 layout(set = 3, binding = 3, scalar) restrict readonly buffer LightDepartures { float departures[]; };  // path_departures, by slot
-layout(set = 3, binding = 4) uniform utextureBuffer gather_media;                                       // records of media
+// As in scene/media_bindings.glsl.
+layout(set = 3, binding = 4) uniform utextureBuffer media_records;
+layout(set = 3, binding = 5) uniform textureBuffer media_densities;
+layout(set = 3, binding = 6) uniform textureBuffer media_majorants;
+#define CLERESTORY_MEDIA_BOUND
 
 #include "techniques/instant_radiosity/medium_connection.glsl"
 #include "walk/draws.glsl"
+#include "transport/media_tracking.glsl"
 #include "walk/candidate_alpha.glsl"
 
 #define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
@@ -76,8 +84,11 @@ layout(set = 3, binding = 4) uniform utextureBuffer gather_media;               
 // Stand in walk_resume for a place that goes on in a later dispatch, and for one that has no light to gather or is done.
 const uint GATHER_STOPPED = 0xFFFFFFFEu;
 const uint GATHER_DONE = 0xFFFFFFFCu;
-// Tells the candidates of these rays from those of the paths' own.
+// Tells the candidates of these rays from those of the paths' own, and their walks through grids.
 const uint GATHER_SEED = 0x76706c73u;
+const uint RATIO_SEED = 0x76706c74u;
+// Random numbers of a walk through a grid, as a power of two; those of the next begin behind them.
+const uint RATIO_WALK_SHIFT = 16u;
 
 // Whether the picture has what is scattered so often between a light source and the eye.
 bool counts_bounces(uint bounces) { return !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces); }
@@ -89,6 +100,24 @@ float gathered_share(uint slot, WalkState path, float cos_here, float t) {
     }
     float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
     return 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, t * t);
+}
+
+// The walk of an eye path's ray through a grid, as path_medium.comp has it: with the same stops, where the path goes on with a way of its own.
+uint track_path(SceneMedium m, uint slot, WalkState path, uint dimension, bool passes, bool airlit, float end, MediumState at, inout vec3 weight,
+                out float t) {
+    uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), dimension, push.key.seed);
+    GridWalk walk = begin_grid_walk(m, path.origin, path.direction, at.start, end);
+    bool cut = false;
+    if (airlit) {
+        float longest = AIRLIGHT_DEPTH / (m.majorant * m.density_max);
+        cut = walk.t_end > longest;
+        walk.t_end = min(walk.t_end, longest);
+    }
+    vec3 emitted = vec3(0.0);
+    uint outcome = delta_tracking(m, key, vec3(0.0), passes, walk, at.bands, weight, emitted);
+    t = walk.entry + walk.t;
+    outcome = cut && outcome == GRID_LEFT ? GRID_STOPPED : outcome;
+    return outcome == GRID_STOPPED && resumed_start(at.start, t) >= end ? GRID_LEFT : outcome;
 }
 
 // Prepares the receiver of a place; false where nothing is gathered.
@@ -116,22 +145,37 @@ bool begin_receiver(uint slot, uint place, out MediumReceiver r) {
     r.at.interior = crossing.interior;
     uint medium = medium_inside(crossing.interior, push.surrounding);
     if (medium != NO_MEDIUM && end > at.start) {
-        GatherMedium m = load_gather_medium(medium);
-        float t_max = end >= FAR_AWAY ? FAR_AWAY : end - at.start;
-        if (m.sigma_s == vec3(0.0)) {
-            weight = transmittance(m.sigma_t, t_max);
-        } else {
-            Sampler s = walk_sampler(slot, DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot));
-            FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, at.bands, t_max, sample_2d(s));
-            weight = flight.weight;
-            if (flight.collides) {
-                float t = max(at.start + flight.t, 0.0);
-                r.medium = medium;
-                r.at.arrival.surface.point = SurfacePoint(path.origin + t * path.direction, vec3(0.0));
-                r.at.arrival.wo = -path.direction;
-                r.at.throughput = path.throughput * weight * gathered_share(slot, path, 1.0, t);
-                return r.at.throughput != vec3(0.0);
+        SceneMedium m = load_medium(medium);
+        bool passes = m.sigma_s == vec3(0.0);
+        uint outcome = GRID_LEFT;
+        float t = 0.0;
+        uint dimension = DIMENSION_FIRST_MEDIUM + DIMENSIONS_PER_WAY * walk_round(slot);
+        if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
+            float t_max = end >= FAR_AWAY ? FAR_AWAY : end - at.start;
+            if (passes) {
+                weight = transmittance(m.sigma_t, t_max);
+            } else {
+                Sampler s = walk_sampler(slot, dimension);
+                FreeFlight flight = sample_free_flight(m.sigma_s, m.sigma_t, at.bands, t_max, sample_2d(s));
+                weight = flight.weight;
+                outcome = flight.collides ? GRID_COLLIDED : GRID_LEFT;
+                t = at.start + flight.t;
             }
+        } else if (HAS_GRIDS) {
+            uint scattered = r.at.bounce + 1u;
+            bool airlit = HAS_AIRLIGHT && !passes && is_open(crossing.interior) && scattered >= push.least_bounces && scattered <= push.most_bounces;
+            outcome = track_path(m, slot, path, dimension, passes, airlit, end, at, weight, t);
+        }
+        if (outcome == GRID_STOPPED) {
+            return false;
+        }
+        if (outcome == GRID_COLLIDED) {
+            t = max(t, 0.0);
+            r.medium = medium;
+            r.at.arrival.surface.point = SurfacePoint(path.origin + t * path.direction, vec3(0.0));
+            r.at.arrival.wo = -path.direction;
+            r.at.throughput = path.throughput * weight * gathered_share(slot, path, 1.0, t);
+            return r.at.throughput != vec3(0.0);
         }
     }
     if (!met || crossing.boundary) {
@@ -151,15 +195,16 @@ bool begin_receiver(uint slot, uint place, out MediumReceiver r) {
     return r.at.throughput != vec3(0.0);
 }
 
-// Random words that alpha is drawn by on the way to a light. The point and the way to it stand for the path.
-uvec4 connection_words(MediumReceiver r, uint number) {
+// Random words of a connection. The point and the way to it stand for the path. `purpose` tells words of one connection apart.
+uvec4 connection_words(MediumReceiver r, uint number, uint purpose) {
     uvec3 place = floatBitsToUint(r.at.arrival.surface.point.position);
     uvec3 way = floatBitsToUint(r.at.arrival.wo);
-    return pcg4d(uvec4(place, push.seed)) + pcg4d(uvec4(way.x ^ number, way.y, way.z + r.at.bounce, GATHER_SEED));
+    return pcg4d(uvec4(place, push.seed)) + pcg4d(uvec4(way.x ^ number, way.y, way.z + r.at.bounce, purpose));
 }
 
-// Takes the stretch up to the next surface, to which the way has been searched; true when the ray has ended, its transmittance known.
-bool pass_stretch(Ray ray, inout MediumGatherState at) {
+// Takes the stretch up to the next surface, to which the way has been searched, or of a grid as much as a walk's quota allows; true when the ray has ended, its
+// transmittance known. `key` is that of the ray's walks through grids.
+bool pass_stretch(Ray ray, uvec4 key, inout MediumGatherState at) {
     bool met = at.hit.triangle != NO_HIT;
     Crossing crossing = Crossing(at.interior, OUTSIDE, false);
     if (met) {
@@ -169,10 +214,29 @@ bool pass_stretch(Ray ray, inout MediumGatherState at) {
             return true;
         }
     }
-    float way = max(at.hit.t - at.start, 0.0) * length(ray.direction);
+    float scale = length(ray.direction);
+    float way = max(at.hit.t - at.start, 0.0) * scale;
     uint medium = medium_inside(crossing.interior, push.surrounding);
     if (medium != NO_MEDIUM) {
-        at.transmittance *= transmittance(load_gather_medium(medium).sigma_t, way);
+        SceneMedium m = load_medium(medium);
+        if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
+            at.transmittance *= transmittance(m.sigma_t, way);
+        } else if (HAS_GRIDS) {
+            GridWalk walk = begin_grid_walk(m, ray.origin, ray.direction, at.start, at.hit.t);
+            walk.draw = at.grid_walks << RATIO_WALK_SHIFT;
+            ++at.grid_walks;
+            // A quota for each stretch: where walks stop does not depend on how many share a dispatch.
+            uint iterations = GRID_WALK_QUOTA;
+            uint outcome = ratio_tracking(m, key, scale, walk, iterations, at.transmittance);
+            float reached = resumed_start(at.start, walk.entry + walk.t);
+            // The search that goes on from the surface itself would miss it.
+            if (outcome == GRID_STOPPED && reached < at.hit.t) {
+                at.start = reached;
+                at.cursor = INDEX_START;
+                at.hit = no_hit(ray.t_max);
+                return false;
+            }
+        }
     }
     if (HAS_ABSORPTION && crossing.interior != OUTSIDE) {
         at.transmittance *= transmittance(load_material(crossing.interior).absorption, way);
@@ -203,15 +267,16 @@ void gather(MediumReceiver r, inout MediumGatherState at, out uint rays) {
                 at.hit = no_hit(shadow.ray.t_max);
                 at.start = shadow.start;
                 at.interior = shadow.interior;
+                at.grid_walks = 0u;
             }
             if (HAS_ALPHA) {
-                candidate_key = connection_words(r, at.light);
+                candidate_key = connection_words(r, at.light, GATHER_SEED);
             }
             Ray rest = Ray(shadow.ray.origin, search_start(at.start), shadow.ray.direction, shadow.ray.t_max);
             at.cursor = closest_hit(rest, at.cursor, at.hit);
             stopped = at.cursor != INDEX_FINISHED;
             if (!stopped) {
-                ended = pass_stretch(shadow.ray, at);
+                ended = pass_stretch(shadow.ray, connection_words(r, at.light, RATIO_SEED), at);
                 at.sum += ended ? found * at.transmittance : vec3(0.0);
             }
         }
@@ -243,7 +308,7 @@ void main() {
         return;
     }
     MediumGatherState at =
-        MediumGatherState(vec3(0.0), 0u, vec3(1.0), INDEX_START, no_hit(0.0), 0.0, OUTSIDE, 0u);
+        MediumGatherState(vec3(0.0), 0u, vec3(1.0), INDEX_START, no_hit(0.0), 0.0, OUTSIDE, 0u, 0u);
     if (goes_on) {
         at = medium_gather_states[place];
     } else {
@@ -255,7 +320,7 @@ void main() {
     COUNT_WIDE(gather_counters.connections, at.light - first)
     COUNT_WIDE(gather_counters.shadow_rays, rays)
     if (!goes_on) {
-        count_work(index_iterations + CONNECTION_ITERATIONS * LIGHTS_AT_ONCE, WORK_UNIT);
+        count_work(index_iterations + GRID_ITERATION_WORK * grid_iterations + CONNECTION_ITERATIONS * LIGHTS_AT_ONCE, WORK_UNIT);
     }
     if (at.light == push.lights) {
         walk_gathered[slot].radiance += r.at.throughput * at.sum * push.scale;

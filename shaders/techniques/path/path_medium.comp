@@ -80,9 +80,6 @@ struct Segment {
     float reach;  // FAR_AWAY: endless
 };
 
-// Whether light from outside reaches the inside of a body unbent: what is inside a solid that refracts has none but that of lamps inside.
-bool is_open(uint interior) { return interior == OUTSIDE || (material_quarter(interior, 1u).w & MATERIAL_BOUNDARY) != 0u; }
-
 // Whether light has points that samples can be taken of.
 bool has_place(uint kind) {
     return (HAS_AREA_LIGHTS && kind == LIGHT_TRIANGLE) || (HAS_PUNCTUAL_LIGHTS && (kind == LIGHT_POINT || kind == LIGHT_SPOT));

@@ -64,10 +64,6 @@ pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
     let from_infinity = profile.has_environment() || profile.lights.directional > 0;
     reasons(&[
         (
-            profile.media.heterogeneous,
-            "the scene has participating media with a density grid, and virtual lights are collisions with homogeneous media only",
-        ),
-        (
             profile.media.emits_endlessly,
             "the scene has an endless participating medium that emits everywhere, more than walks carry",
         ),
@@ -163,7 +159,7 @@ const ROWS: &[Row] = &[
         id: "SVO-G0",
         name: "technique `vpl`: direct light and mirrors by rays, all else from virtual point lights, new for each pass (instant radiosity)",
         role: Role::Technique,
-        limits: "Refuses scenes with media that have a density grid, or unlit surfaces; light off a mirror or through smooth glass onto the first rough surface is no part of the picture, and light that a mirror sends into a medium is found by eye paths alone; biased where a bound is not compensated, by a limited number of steps, or by lights of little potential that are left out; walks that go on over surfaces with interpolated or mapped normals scatter otherwise than eye paths, which bend these normals towards the eye; virtual lights within rounding of an edge shine past it; all pixels of a pass share its noise; of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
+        limits: "Refuses scenes with unlit surfaces, and with endless media that emit or have light from infinity; light off a mirror or through smooth glass onto the first rough surface is no part of the picture, and light that a mirror sends into a medium is found by eye paths alone; biased where a bound is not compensated, by a limited number of steps, or by lights of little potential that are left out; walks that go on over surfaces with interpolated or mapped normals scatter otherwise than eye paths, which bend these normals towards the eye; virtual lights within rounding of an edge shine past it; all pixels of a pass share its noise; of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
         sources: &[
             sources::KELLER_1997.whole(),
             sources::KOLLIG_KELLER_2006.whole(),

@@ -1,15 +1,16 @@
-//! Gathering from virtual lights in scenes with homogeneous media: the kernel that stands in for that of surfaces alone (`gather.rs`), whose places may be collisions.
+//! Gathering from virtual lights in scenes with media: the kernel that stands in for that of surfaces alone (`gather.rs`), whose places may be collisions.
 
 use super::gather::{GatherStage, lights_beside};
 use super::settings::VirtualLightSettings;
 use crate::Result;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{INSTANCE_SEARCH_STEPS, NO_MEDIUM};
+use crate::gpu::shaders::constants::{GRID_WALK_QUOTA, INSTANCE_SEARCH_STEPS, NO_MEDIUM};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::techniques::instant_radiosity::{vpl_gather, vpl_medium_gather};
 use crate::gpu::shaders::types::MediumGatherState;
 use crate::gpu::{BufferView, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::techniques::PathTracerSettings;
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::walk::WalkKey;
@@ -50,13 +51,23 @@ impl MediumGather {
         } else {
             0
         };
-        let (lights_at_once, index_quota) = lights_beside(gpu, scene, settings.lights_at_once, [0, search])?;
+        let grid = if profile.media.heterogeneous {
+            GRID_WALK_QUOTA
+        } else {
+            0
+        };
+        let beside = [grid, search + grid];
+        let (lights_at_once, index_quota) = lights_beside(gpu, scene, settings.lights_at_once, beside)?;
         let traversal = scene.index_traversal();
         let spec = surface_spec!(vpl_medium_gather, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
             separable_masking: false,
             has_alpha: profile.has_alpha(),
             has_media: true,
+            has_grids: profile.media.heterogeneous,
+            has_homogeneous: profile.media.homogeneous,
+            // As those of the eye paths, whose ways through grids end where such samples do.
+            has_airlight: PathTracerSettings::default().equiangular && scene.airlight_helps(),
             has_path_automaton: eye.has_automaton(),
             sampler_kind: settings.sampler as u32,
             edge_bound: edge_bound.kind(),
@@ -99,13 +110,15 @@ impl MediumGather {
             surrounding: stage.scene.surrounding().unwrap_or(NO_MEDIUM),
         };
         let (index, of_scene) = (stage.scene.index_set(), stage.scene.scene_set());
-        let surfaces = stage.set();
+        let (surfaces, media) = (stage.set(), stage.scene.media_set());
         let own = vpl_medium_gather::Set3 {
             virtual_light_texels: surfaces.virtual_light_texels,
             medium_gather_states: surfaces.virtual_light_states,
             gather_counters: surfaces.gather_counters,
             light_departures: surfaces.light_departures,
-            gather_media: stage.scene.media_set().media_records,
+            media_records: media.media_records,
+            media_densities: media.media_densities,
+            media_majorants: media.media_majorants,
         };
         let sets: [&dyn BindingSet<'_>; 4] = [wave, &index, &of_scene, &own];
         match over {
@@ -122,9 +135,9 @@ impl MediumGather {
 /// Rows of the catalogue.
 pub(crate) const ROWS: &[Row] = &[Row {
     id: "CL-VPL-MEDIA",
-    name: "virtual lights in homogeneous media: collisions of walks, with the phase function as their lobe, that light surfaces and collisions of eye paths through what media let through",
+    name: "virtual lights in media: collisions of walks, with the phase function as their lobe, that light surfaces and collisions of eye paths through what media let through",
     role: Role::PartOf("SVO-G0"),
-    limits: "Media with a density grid are refused, as are light from infinity in an endless medium, cuts, shares of the potential, fractional walks and steps of compensation; light that a mirror sends into a medium is found by eye paths alone; without a bound the variance of lights near a collision has no bound either.",
+    limits: "Light from infinity in an endless medium is refused, as are endless media that emit everywhere, cuts, shares of the potential, fractional walks and steps of compensation; light that a mirror sends into a medium is found by eye paths alone; without a bound the variance of lights near a collision has no bound either.",
     sources: &[sources::KELLER_1997.whole(), sources::KOLLIG_KELLER_2006.whole()],
     shaders: &[
         "shaders/techniques/instant_radiosity/vpl_medium.comp",
@@ -133,10 +146,12 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "shaders/techniques/instant_radiosity/medium_connection.glsl",
         "shaders/techniques/instant_radiosity/collision_light.glsl",
         "shaders/techniques/path/path_medium.comp",
+        "shaders/transport/media_tracking.glsl",
     ],
     bias: Some(Bias::Unbiased),
     tests: &[
         "tests/tests/instant_radiosity/media.rs::lights_at_collisions_agree_with_the_path_tracer",
+        "tests/tests/instant_radiosity/media.rs::lights_in_grids_agree_with_the_path_tracer",
         "tests/tests/instant_radiosity/media.rs::bounds_in_media_are_compensated",
         "tests/tests/instant_radiosity/media.rs::furnaces_with_fog_are_even",
         "tests/tests/instant_radiosity/media.rs::light_off_mirrors_into_media_is_the_eye_paths",

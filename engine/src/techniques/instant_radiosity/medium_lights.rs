@@ -1,4 +1,4 @@
-//! Virtual lights of scenes with homogeneous media: walks through these, whose collisions are virtual lights as well as their deposits on surfaces, in one order.
+//! Virtual lights of scenes with media: walks through these, whose collisions are virtual lights as well as their deposits on surfaces, in one order.
 
 use crate::Result;
 use crate::gpu::shaders::constants::{NO_MEDIUM, VIRTUAL_LIGHT_QUARTERS};
@@ -28,6 +28,8 @@ impl MediumLights {
         let medium = vpl_medium::Spec {
             has_absorption: profile.has_absorption,
             has_instances: profile.keeps_instances,
+            has_grids: profile.media.heterogeneous,
+            has_homogeneous: profile.media.homogeneous,
             sampler_kind: sampler as u32,
             ..Default::default()
         };

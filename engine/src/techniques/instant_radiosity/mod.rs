@@ -1,4 +1,4 @@
-//! Instant radiosity: indirect light as that of virtual point lights, which walks from the lights leave on surfaces and in homogeneous media.
+//! Instant radiosity: indirect light as that of virtual point lights, which walks from the lights leave on surfaces and in media.
 
 mod append;
 mod card;

@@ -8,7 +8,7 @@
 //! beyond, eye paths go on with the weight of what it left out, and gather again where they arrive. Light off a mirror or through smooth glass onto the first
 //! rough surface is no part of the picture: no virtual light lies on either.
 //!
-//! In homogeneous media collisions of walks are virtual lights as well, and eye paths gather at a collision of their ray or at the surface, as free flights choose. A
+//! In media collisions of walks are virtual lights as well, and eye paths gather at a collision of their ray or at the surface, as free flights choose. A
 //! collision scatters by the medium's phase function, and the geometry term has no cosine there. What a mirror sends into a medium is the eye paths', which go on from their
 //! collisions.
 //!
@@ -104,7 +104,7 @@ impl VirtualLights {
     ///
     /// # Errors
     /// [`Error::Setting`] for a setting or size out of range, or one that is not for a scene with participating media, [`Error::Unsupported`] for a scene with unlit
-    /// surfaces, media with a density grid, an endless medium that emits, or one with light from infinity, [`Error::LimitExceeded`] for a ray index whose leaves are too long for a
+    /// surfaces, an endless medium that emits everywhere, or one with light from infinity, [`Error::LimitExceeded`] for a ray index whose leaves are too long for a
     /// software device and for media that emit among bodies of more than 8,192 triangles, [`Error::OutOfMemory`].
     pub fn new(
         gpu: &Gpu,

@@ -91,10 +91,12 @@ crate::settings! {
         /// Source: T. Kollig and A. Keller, "Illumination in the Presence of Weak Singularities", MCQMC 2004, 2006.
         pub compensation: Compensation = Compensation::Rays;
         /// Scatterings of eye paths that go on for the compensation, at most, which leaves a part of the light out; 0 goes on until the weight is zero.
+        ///
+        /// 0 alone in scenes with participating media.
         pub compensation_steps: u32 = 0, in 0..=8, unit "scatterings";
         /// Which virtual lights send a place shadow rays: all, the strongest, or by chance one below each node of a cut through a tree of them.
         ///
-        /// All and cuts have the same expected picture; the strongest alone bias it, as `rescales` says.
+        /// All and cuts have the same expected picture; the strongest alone bias it, as `rescales` says. Scenes with participating media have all alone.
         pub selection: Selection = Selection::All;
         /// Of `selection` potential: the share of what all lights would bring if nothing stood between that those taken carry.
         pub potential_share: f32 = 0.9, in 0.0..=1.0, unit "of the potential";
@@ -115,7 +117,7 @@ crate::settings! {
         /// Ends walks by one number each, evenly spread over a pass, so that as many survive each scattering as albedos say, instead of by a
         /// roulette at each; changes the noise only.
         ///
-        /// Source: A. Keller, "Instant Radiosity", SIGGRAPH 1997, whose walks are fractional powers of the albedo times their number.
+        /// Not in scenes with participating media. Source: A. Keller, "Instant Radiosity", SIGGRAPH 1997, whose walks are fractional powers of the albedo times their number.
         pub fractional: bool = false;
         /// Eye paths per pixel that the same virtual lights light.
         ///
