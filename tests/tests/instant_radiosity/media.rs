@@ -100,6 +100,20 @@ fn lights_in_grids_agree_with_the_path_tracer() {
     });
 }
 
+/// Walks start in a medium that emits, where nothing else does.
+#[test]
+fn media_that_emit_send_walks() {
+    with_gpu(|gpu| {
+        let mut scene = fog_body(Phase::Isotropic);
+        scene.name = "glowing body".into();
+        scene.lights.clear();
+        scene.media[0].emission = Vec3::new(3.0, 2.0, 1.0);
+        let found = passes(gpu, &scene, &several(), 48);
+        found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
+        assert!(found.counts.lights > 0, "{:?}", found.counts);
+    });
+}
+
 /// Bounds of both kinds about those that would be chosen, and a loose one, which leaves nothing to compensate.
 #[test]
 fn bounds_in_media_are_compensated() {

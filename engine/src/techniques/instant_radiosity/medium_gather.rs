@@ -152,6 +152,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "tests/tests/instant_radiosity/media.rs::lights_at_collisions_agree_with_the_path_tracer",
         "tests/tests/instant_radiosity/media.rs::lights_in_grids_agree_with_the_path_tracer",
+        "tests/tests/instant_radiosity/media.rs::media_that_emit_send_walks",
         "tests/tests/instant_radiosity/media.rs::bounds_in_media_are_compensated",
         "tests/tests/instant_radiosity/media.rs::furnaces_with_fog_are_even",
         "tests/tests/instant_radiosity/media.rs::light_off_mirrors_into_media_is_the_eye_paths",
