@@ -3,6 +3,7 @@
 pub mod kernel;
 
 mod card;
+mod collisions;
 mod device_map;
 mod gather;
 mod glow;
@@ -16,6 +17,7 @@ mod tracer;
 pub mod volume;
 
 pub(super) use card::CARD;
+pub(super) use collisions::{CollisionPass, CollisionStage};
 pub use gather::{GatherCounts, RayFetches};
 pub use map::{MapContents, map_contents};
 pub use mapper::{MappedEvent, MappedPhoton, MapperCounts, PhotonMapper};

@@ -21,6 +21,7 @@ pub(in crate::techniques) use plan::{PhotonPlan, Stored};
 use std::sync::Arc;
 
 use self::stages::PhotonStages;
+use super::collisions::CollisionStage;
 use super::glow::GlowStage;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
@@ -130,7 +131,7 @@ struct Kit {
     emission: Option<TexelView>,
     /// Only where media emit.
     glow: Option<GlowStage>,
-    /// Only in scenes with media.
+    /// Only in scenes with media, unless `append` has a stage for collisions.
     volume: Option<VolumeTrace>,
     /// Of expressions: successors of classes, and those by scattering in media.
     classes: Option<(Buffer, [u32; 2])>,
@@ -203,7 +204,8 @@ impl PhotonTracer {
         };
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
         let volume = || VolumeTrace::new(gpu, &scene, &plan, media, slots);
-        let volume = profile.media.any().then(volume).transpose()?;
+        let has_volume = profile.media.any() && append.collisions().is_none();
+        let volume = has_volume.then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
             kit: Kit {
@@ -269,6 +271,7 @@ impl PhotonTracer {
             Some(volume) => all.extend(volume.pipelines()),
             None => all.push(kit.append.pipeline()),
         }
+        all.extend(kit.append.collisions().map(CollisionStage::pipeline));
         all.extend(self.walker.trace_pipelines());
         all.extend(self.walker.compaction_pipelines());
         all
@@ -346,6 +349,8 @@ impl PhotonTracer {
         let traced = &mut tracing.traced;
         let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
         let [absorbed, events] = volume.unwrap_or_default();
+        let collided = self.kit.append.collisions().map(CollisionStage::counts).transpose()?;
+        let [collided, kept] = collided.unwrap_or_default();
         // What waits are the deposits with a kernel, and in scenes with media what comes from these besides.
         let records = match volume {
             Some(_) => counters.deposits - counters.without_kernel,
@@ -353,11 +358,11 @@ impl PhotonTracer {
         };
         traced.records = traced.records.saturating_add(records);
         traced.events = traced.events.saturating_add(events);
-        traced.counts.events += u64::from(events);
+        traced.counts.events += u64::from(events) + u64::from(kept);
         traced.counts.collisions += walked.media.collisions;
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
-        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed);
+        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed) + u64::from(collided);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
