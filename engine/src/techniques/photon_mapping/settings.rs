@@ -187,7 +187,7 @@ crate::settings! {
         /// subgroups collect; changes pictures only as query does. Rays have each queue, single and in packets, with every estimate of volume.
         pub queue: MapQueue = MapQueue::Slots;
         /// In scenes with media a kernel finds the closest hits of eye rays, and others their ways through media and what they see there, or one does all that; without media there is nothing to
-        /// fuse. Never changes the picture, but its last bits where a query's quota stops it. With slots and single queries alone, and not over a kd-tree.
+        /// fuse. Never changes the picture. With slots and single queries alone, and not over a kd-tree.
         pub stages: MapStages = MapStages::Stream;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.
