@@ -17,11 +17,12 @@
 
 layout(constant_id = 60) const bool TABULATES = false;  // the transmittance along rays through grids, instead of walks
 
-// descriptor set 1: PhotonBeamSet
+// Beside the media, so that set 1 is free for the ray index (photon_beam_fused.comp).
+// descriptor set 3 from binding 8: PhotonBeamSet
 
-layout(set = 1, binding = 0) uniform utextureBuffer event_pairs;
-layout(set = 1, binding = 1) uniform utextureBuffer event_records;
-layout(set = 1, binding = 3, scalar) restrict buffer BeamCounters {
+layout(set = 3, binding = 8) uniform utextureBuffer event_pairs;
+layout(set = 3, binding = 9) uniform utextureBuffer event_records;
+layout(set = 3, binding = 11, scalar) restrict buffer BeamCounters {
     uint queries;
     uint events[2];   // kernels that a ray pierced: 64 bits, the low word first
     // Where COUNT_FETCHES says so, also:
@@ -30,21 +31,21 @@ layout(set = 1, binding = 3, scalar) restrict buffer BeamCounters {
     uint records[2];  // likewise
     uint tests[2];    // pairs of nodes, and records, that each ray has gone through
 } beam_counters;
-layout(set = 1, binding = 4, scalar) restrict buffer PhotonBeamWays { BeamWay beam_ways[]; };    // by place
-layout(set = 1, binding = 5, scalar) restrict buffer PhotonBeamAsked { float beam_asked[]; };    // by slot; of scenes with grids
+layout(set = 3, binding = 12, scalar) restrict buffer PhotonBeamWays { BeamWay beam_ways[]; };    // by place
+layout(set = 3, binding = 13, scalar) restrict buffer PhotonBeamAsked { float beam_asked[]; };    // by slot; of scenes with grids
 // Of maps with planes; elsewhere some other buffer is bound, and nothing is read or written. Rays of earlier bounces have ended.
-layout(set = 1, binding = 6, scalar) restrict buffer PhotonPlaneRays { PlaneRay plane_rays[]; };
+layout(set = 3, binding = 14, scalar) restrict buffer PhotonPlaneRays { PlaneRay plane_rays[]; };
 // The queue of the places that ask (photon_queue.glsl); where there is none some other buffer is bound, and nothing is read.
-layout(set = 1, binding = 7, scalar) restrict readonly buffer BeamQueueHead {
+layout(set = 3, binding = 15, scalar) restrict readonly buffer BeamQueueHead {
     uint groups[3];
     uint count;
     uint block_size;
 } gather_head;
-layout(set = 1, binding = 8, scalar) restrict readonly buffer BeamPlaces { uint gather_places[]; };
-layout(set = 1, binding = 9, scalar) restrict readonly buffer BeamBlocks { uint gather_blocks[]; };
+layout(set = 3, binding = 16, scalar) restrict readonly buffer BeamPlaces { uint gather_places[]; };
+layout(set = 3, binding = 17, scalar) restrict readonly buffer BeamBlocks { uint gather_blocks[]; };
 // WAY_STEPS by place, of scenes with grids; elsewhere there is no more than one, and nothing is read or written. What is left of light behind a step and its distance along the ray, or four
 // places of a table: integrals of the density from where it begins, m.
-layout(set = 1, binding = 10, scalar) restrict buffer PhotonWaySteps { vec4 way_steps[]; };
+layout(set = 3, binding = 18, scalar) restrict buffer PhotonWaySteps { vec4 way_steps[]; };
 
 #include "techniques/photon_mapping/photon_queued_place.glsl"
 
@@ -52,7 +53,7 @@ uvec4 compact_quarter(uint index) { return texelFetch(event_pairs, int(index)); 
 
 #include "accel/compact_bvh.glsl"
 
-layout(set = 1, binding = 2, scalar) restrict readonly buffer PhotonEventRoot { CompactRoot event_root; };
+layout(set = 3, binding = 10, scalar) restrict readonly buffer PhotonEventRoot { CompactRoot event_root; };
 
 layout(push_constant, scalar) uniform Push {
     WalkKey key;
@@ -198,15 +199,14 @@ void begin_ray(uint slot, WalkState path, Hit hit, out Crossing crossing) {
     beam.medium = medium_inside(crossing.interior, push.surrounding);
 }
 
-// Prepares the query of a place, and notes what comes of light from the surface; false where nothing is asked for on the way. Nor is anything where a quota stops the walk
+// Prepares the query of a place whose ray has that hit, and notes what comes of light from the surface; false where nothing is asked for on the way. Nor is anything where a quota stops the walk
 // through a grid (`walks`), which goes on another time (`goes_on`).
-bool begin_beam(uint slot, uint place, WalkState path, bool goes_on, out bool walks) {
+bool begin_beam(uint slot, uint place, WalkState path, Hit hit, bool goes_on, out bool walks) {
     walks = false;
     uint way_state = asking_state(path);
     if ((push.states >> way_state & 1u) == 0u) {
         return false;
     }
-    Hit hit = load_hit(place);
     Crossing crossing;
     begin_ray(slot, path, hit, crossing);
     beam.to = hit.triangle == NO_HIT ? FAR_AWAY : max(hit.t, beam.start);

@@ -32,6 +32,7 @@ mod volume_extremes;
 mod volume_kernels;
 mod volume_queues;
 mod volume_refusals;
+mod volume_stages;
 mod volume_truths;
 mod without;
 

@@ -375,9 +375,9 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-ST-1",
-        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave",
+        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave; and the first three in one kernel",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "No fused form of all stages stands beside it: it would need the sets of the wave, the ray index, the scene, the media and the map at once, of which Vulkan promises four; queries without a queue are fused with what finds their ways.",
+        limits: "The fused form has the rays, their ways through media and the density estimation along them, in scenes with media, without queues, packets or a kd-tree; collisions of paths, surfaces and shadow rays stay stages of their own, whose push constants it has no room for beside its own, and what a quota stops is left to the stages.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4")],
         shaders: &[
             "shaders/walk/extend.comp",
@@ -385,13 +385,22 @@ pub(crate) const ROWS: &[Row] = &[
             "shaders/techniques/path/path_shade.comp",
             "shaders/walk/shadow.comp",
             "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_beam_fused.comp",
             "shaders/techniques/photon_mapping/photon_gather.comp",
         ],
         tests: &[
             "tests/tests/photon/volume_queues.rs::queues_and_packets_of_rays_are_made_for_media_alone",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_are_the_same_in_parts",
+            "tests/tests/photon/volume_stages.rs::fused_stages_make_the_same_picture_in_fewer_passes",
+            "tests/tests/photon/volume_stages.rs::fused_stages_send_rays_towards_planes",
+            "tests/tests/photon/volume_stages.rs::fused_stages_go_through_grids",
+            "tests/tests/photon/volume_stages.rs::queries_that_a_quota_stops_in_a_fused_kernel_are_the_stages",
+            "tests/tests/photon/volume_stages.rs::walks_that_a_quota_stops_in_a_fused_kernel_are_the_stages",
+            "tests/tests/photon/volume_stages.rs::fused_stages_are_the_same_in_parts",
+            "tests/tests/photon/volume_stages.rs::rays_that_a_quota_stops_in_a_fused_kernel_are_the_stages",
+            "tests/tests/photon/volume_stages.rs::fused_stages_are_refused_beside_queues_packets_and_kd_trees",
         ],
-        settings: &["queue", "query"],
+        settings: &["stages", "queue", "query"],
         ..Row::of(file!())
     },
     Row {

@@ -21,6 +21,6 @@ pub(super) use collisions::{CollisionPass, CollisionStage};
 pub use gather::{GatherCounts, RayFetches};
 pub use map::{MapContents, map_contents};
 pub use mapper::{MappedEvent, MappedPhoton, MapperCounts, PhotonMapper};
-pub use settings::{MapBuild, MapQuery, MapQueue, PhotonSettings};
+pub use settings::{MapBuild, MapQuery, MapQueue, MapStages, PhotonSettings};
 pub use tracer::PhotonCounts;
 pub(super) use tracer::{Append, PhotonPlan, PhotonTracer, Stored, Tracing};

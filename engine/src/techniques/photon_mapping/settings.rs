@@ -77,6 +77,18 @@ pub enum MapQueue {
     Blocks,
 }
 
+/// In how many kernels eye paths get what photons in media give them, bounce by bounce.
+///
+/// Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapStages {
+    /// A kernel for the closest hits of rays, and others for their ways through media and what they see there.
+    Stream,
+    /// One kernel for all three.
+    Fused,
+}
+
 /// Who builds the map. The same bytes either way, where the device rounds numbers of 64 bits as IEEE 754 says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -174,6 +186,9 @@ crate::settings! {
         /// Invocations of queries serve every path under way, or only those that query the map in question, found by stream compaction or in blocks that
         /// subgroups collect; changes pictures only as query does. Rays have each queue, single and in packets, with every estimate of volume.
         pub queue: MapQueue = MapQueue::Slots;
+        /// In scenes with media a kernel finds the closest hits of eye rays, and others their ways through media and what they see there, or one does all that; without media there is nothing to
+        /// fuse. Never changes the picture. With slots and single queries alone, and not over a kd-tree.
+        pub stages: MapStages = MapStages::Stream;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.
         pub map_build: MapBuild = MapBuild::Auto;
@@ -208,6 +223,10 @@ impl PhotonSettings {
                 self.volume.word()
             );
             return Err(Error::setting("volume_kernel", self.volume_kernel.word(), cause));
+        }
+        if self.stages == MapStages::Fused && (self.queue != MapQueue::Slots || self.query != MapQuery::Single) {
+            let cause = "needs \"queue\": \"slots\" and \"query\": \"single\": a queue is filled between the kernels that it fuses";
+            return Err(Error::setting("stages", "fused", cause));
         }
         if self.volume_paths && self.volume != VolumeEstimate::Unified {
             let cause = format!("needs \"volume\": \"unified\", but that is \"{}\"", self.volume.word());

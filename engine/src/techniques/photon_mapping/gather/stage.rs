@@ -65,14 +65,10 @@ impl GatherStage<'_> {
                 .map_or(self.gather.counters.view(), Beam::ways),
         }
     }
-}
 
-impl ArrivalStage for GatherStage<'_> {
-    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+    /// Records what comes behind queries of the volume map: rays towards planes, and queries on surfaces.
+    fn record_behind_beams(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
         let gather = self.gather;
-        if let Some(beam) = &self.beam {
-            beam.record(recorder, self.scene, wave, places)?;
-        }
         if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
             recorder.pass("photon: plane rays", |pass| {
                 planes.record(pass, self.scene, wave, places)
@@ -103,6 +99,26 @@ impl ArrivalStage for GatherStage<'_> {
             stage_barrier(pass);
             Ok(())
         })
+    }
+}
+
+impl ArrivalStage for GatherStage<'_> {
+    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+        if let Some(beam) = &self.beam {
+            beam.record(recorder, self.scene, wave, places)?;
+        }
+        self.record_behind_beams(recorder, wave, places)
+    }
+
+    fn finds_hits(&self) -> bool {
+        self.beam.as_ref().is_some_and(BeamStage::finds_hits)
+    }
+
+    fn record_with_hits(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+        if let Some(beam) = &self.beam {
+            beam.record_with_hits(recorder, self.scene, wave, places)?;
+        }
+        self.record_behind_beams(recorder, wave, places)
     }
 
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {

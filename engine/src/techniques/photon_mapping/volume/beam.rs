@@ -1,7 +1,8 @@
 //! What eye paths see of a volume map along their ways through media: the first part of the stage between arrival and scattering, in scenes with media.
 //!
 //! Rays ask by themselves or a subgroup's together, at every place of a wave or from a queue of those that do (B. Fabianowski, "Interactive Manycore Photon
-//! Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4): each one's sum has the order of the map's leaves, and the same bits.
+//! Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4): each one's sum has the order of the map's leaves, and the same bits. So it has where one kernel finds a ray's hit, its way
+//! and what is seen along it.
 
 use std::sync::OnceLock;
 
@@ -10,12 +11,15 @@ use super::map::EventMap;
 use super::plane_rays::PlaneRays;
 use super::transmittance::VolumeTransmittance;
 use super::ways::BeamLength;
+use crate::accel::DeviceTraversal;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
     LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS, QUEUE_SLOTS, WALK_GROUP, WAY_STEPS,
 };
 use crate::gpu::shaders::sets::{PhotonBeamSet, WaveSet};
-use crate::gpu::shaders::techniques::photon_mapping::{photon_beam, photon_beam_packet, photon_beam_ways};
+use crate::gpu::shaders::techniques::photon_mapping::{
+    photon_beam, photon_beam_fused, photon_beam_packet, photon_beam_ways,
+};
 use crate::gpu::shaders::types::{AskSettings, BeamWay};
 use crate::gpu::{
     Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, wide_counter,
@@ -23,13 +27,15 @@ use crate::gpu::{
 use crate::techniques::photon_mapping::gather::{GatherCounts, RayFetches};
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
 use crate::techniques::photon_mapping::queue::{AskSpec, Queue, QueueMemory};
-use crate::techniques::photon_mapping::settings::{MapQuery, PhotonSettings};
+use crate::techniques::photon_mapping::settings::{MapQuery, MapStages, PhotonSettings};
 use crate::transport::{GpuScene, PathSet};
-use crate::walk::{Places, WalkKey, default_slots, stage_barrier};
+use crate::walk::{Places, RAY_QUOTA, WalkKey, default_slots, ray_quota, stage_barrier, work_least};
 use crate::{Error, Result};
 
 /// Nodes and events of a query, at most: beside a walk through a grid, its loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
 const BEAM_QUOTA: u32 = 32_768;
+/// The same where the kernel has found the ray's hit before, whose lanes may take turns as those of walks do; the stages ask for the rest.
+const FUSED_QUOTA: u32 = 12_288;
 /// Bytes of the steps of a walk through a grid, or of its table.
 const STEPS_BYTES: usize = WAY_STEPS as usize * size_of::<[f32; 4]>();
 
@@ -46,6 +52,8 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     gpu: Gpu,
     query: Query,
     queue: Queue,
+    /// Finds hits of rays, too, in place of the walker's stage.
+    fused: Option<ComputePipeline<photon_beam_fused::Kernel>>,
     /// Finds the ways before the queue is filled; without one queries do.
     way_finder: Option<ComputePipeline<photon_beam_ways::Kernel>>,
     /// For places that a quota stopped: made when it is first needed.
@@ -98,7 +106,7 @@ impl Beam {
     /// For up to `slots` eye paths at once, with a queue in the memory `queues`.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`Error::OutOfMemory`], [`Error::Setting`] for fused stages over a kd-tree, and as [`ray_quota`].
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
@@ -122,7 +130,13 @@ impl Beam {
         };
         let queue = Queue::new(gpu, scene, queues, queue)?;
         let tabulates = settings.volume_transmittance == VolumeTransmittance::Table;
-        // Both entry points have the same constants.
+        let (fuses, traversal) = (settings.stages == MapStages::Fused, scene.index_traversal());
+        if fuses && matches!(traversal, DeviceTraversal::Kd { .. }) {
+            // A ray that it stops may go on at any number, and so at one that says how far a place is (PLACE_RAY_ENDED).
+            let cause = "cannot go through a kd-tree: take another ray index, or \"stream\"";
+            return Err(Error::setting("stages", "fused", cause));
+        }
+        // All entry points have the same constants.
         macro_rules! spec {
             ($shader:ident, $queue:expr, $linear:expr) => {
                 $shader::Spec {
@@ -146,10 +160,26 @@ impl Beam {
                     has_classes: classes.is_some(),
                     queue: $queue,
                     linear: $linear,
+                    after_fused: fuses,
                     ..Default::default()
                 }
             };
         }
+        let has_alpha = profile.has_alpha();
+        let fused = || {
+            let spec = photon_beam_fused::Spec {
+                has_alpha,
+                // Attributes are read for alpha alone.
+                has_textures: has_alpha && profile.has_textures,
+                has_vertex_colors: has_alpha && profile.has_vertex_colors,
+                index_quota: ray_quota(gpu, scene, RAY_QUOTA)?,
+                index_kind: traversal.kind(),
+                work_least: work_least(gpu.caps().kind),
+                compact_quota: settings.query_quota.min(FUSED_QUOTA),
+                ..spec!(photon_beam_fused, QUEUE_SLOTS, false)
+            };
+            traversal.pipeline::<photon_beam_fused::Kernel>(gpu, &spec)
+        };
         let query = match settings.query {
             MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_beam, queue.kind(), false))?),
             MapQuery::Packet => Query::Packet(gpu.compute_pipeline(&spec!(photon_beam_packet, queue.kind(), false))?),
@@ -182,6 +212,7 @@ impl Beam {
         Ok(Self {
             gpu: gpu.clone(),
             query,
+            fused: fuses.then(fused).transpose()?,
             way_finder: queue
                 .collects()
                 .then(|| gpu.compute_pipeline::<photon_beam_ways::Kernel>(&way_finder))
@@ -212,6 +243,7 @@ impl Beam {
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all: Vec<PipelineInfo> = self.way_finder.iter().map(ComputePipeline::info).collect();
         all.extend(self.queue.pipelines());
+        all.extend(self.fused.iter().map(ComputePipeline::info));
         all.push(match &self.query {
             Query::Single(kernel) => kernel.info(),
             Query::Packet(kernel) => kernel.info(),
@@ -330,6 +362,36 @@ impl BeamStage<'_> {
                 Query::Single(kernel) => pass.dispatch_indirect(kernel, &sets, &push, groups)?,
                 Query::Packet(kernel) => pass.dispatch_indirect(kernel, &sets, &bytemuck::cast(push), groups)?,
             }
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
+    /// Whether one kernel finds the hits of rays and asks along them.
+    pub fn finds_hits(&self) -> bool {
+        self.beam.fused.is_some()
+    }
+
+    /// Records that kernel at all places.
+    ///
+    /// # Errors
+    /// Those of recording, and [`Error::Internal`] where there is none.
+    pub fn record_with_hits(
+        &self,
+        recorder: &mut Recorder,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        places: Places<'_>,
+    ) -> Result<()> {
+        let fused = self.beam.fused.as_ref().ok_or_else(|| Error::Internal {
+            what: "volume map".into(),
+            fault: "has no kernel that finds hits".into(),
+        })?;
+        let (set, index, of_scene, media) = (self.set(), scene.index_set(), scene.scene_set(), scene.media_set());
+        let sets: [&dyn BindingSet<'_>; 5] = [wave, &index, &of_scene, &media, &set];
+        let push = self.push(scene, places.key);
+        recorder.pass("photon: rays and beams", |pass| {
+            pass.dispatch_indirect(fused, &sets, &bytemuck::cast(push), places.items)?;
             stage_barrier(pass);
             Ok(())
         })
