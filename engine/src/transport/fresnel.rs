@@ -297,8 +297,8 @@ mod tests {
         let cross_s = two * c * root_of_half(a2);
         let rs = (sum - cross_s) / (sum + cross_s + tiny);
         let sum_p = c2 * a2b2 + s2 * s2;
-        let cross_p = cross_s * s2;
-        half * (rs + rs * (sum_p - cross_p) / (sum_p + cross_p + tiny))
+        let across = cross_s * s2;
+        half * (rs + rs * (sum_p - across) / (sum_p + across + tiny))
     }
 
     /// The single expression as it is printed, with quotients by the cosine.
