@@ -72,7 +72,12 @@ pub(super) fn uneven(mut medium: Medium) -> Medium {
     medium
 }
 
-pub(super) fn all_events(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, pass: u32) -> (Vec<MappedEvent>, MapperCounts) {
+pub(super) fn all_events(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &PhotonSettings,
+    pass: u32,
+) -> (Vec<MappedEvent>, MapperCounts) {
     let mut mapper = mapper(gpu, scene, settings);
     let events = mapper.events(pass).unwrap_or_else(|error| panic!("{error}"));
     (events, mapper.counts())
