@@ -237,6 +237,11 @@ impl<'a> Easel<'a> {
         }
     }
 
+    /// Whether pixels share the noise of a pass.
+    pub fn shares_noise(&self) -> Result<bool> {
+        shares_noise(self.info, &self.settings)
+    }
+
     /// Whether its pictures have a bias.
     pub fn has_bias(&self) -> bool {
         !matches!(self.info.bias, Bias::Unbiased)
