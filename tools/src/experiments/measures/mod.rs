@@ -194,6 +194,7 @@ measures! {
     on_device "volume-bandwidths" photons::volume_bandwidths;
     on_device "volume-dampening" photons::volume_dampening;
     on_device "volume-frame" photons::volume_frame;
+    on_device "volume-peers" rendering::volume_peers;
     on_device "volume-scenes" photons::volume_scenes;
     on_device "volume-queues" photons::volume_queues;
     on_device "vpl-history" virtual_lights::vpl_history;
