@@ -191,6 +191,7 @@ measures! {
     on_host "virtual-images" impostors::virtual_images;
     on_device "upsampling" preview::upsampling;
     on_device "view-shadows" preview::view_shadows;
+    on_host "volume-bands" media::volume_bands;
     on_device "volume-bandwidths" photons::volume_bandwidths;
     on_device "volume-dampening" photons::volume_dampening;
     on_device "volume-frame" photons::volume_frame;
