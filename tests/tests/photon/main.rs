@@ -25,6 +25,7 @@ mod sphere;
 mod traps;
 mod unified;
 mod volume;
+mod volume_footprints;
 mod volume_kernels;
 mod volume_queues;
 mod volume_truths;

@@ -336,6 +336,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/volume/chain_tests.rs::footprints_that_forget_who_has_collided_are_too_small",
             "tests/tests/photon/volume.rs::kernels_from_footprints_hold_as_many_collisions_as_they_should",
             "tests/tests/photon/volume.rs::kernels_from_footprints_agree_with_the_path_tracer",
+            "tests/tests/photon/volume_footprints.rs::kernels_in_nested_bodies_are_those_of_all_that_photons_have_passed",
+            "tests/tests/photon/volume_footprints.rs::kernels_behind_glass_are_those_of_refracted_footprints",
             "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
         ],
         settings: &["volume_kernel", "volume_spread", "volume_dampening"],
