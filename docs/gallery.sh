@@ -89,6 +89,10 @@ scene caustic 'builtin:cornell-box?sphere=glass&boxes=none&lamp=0.1' 1 8 \
     'A small lamp over a glass sphere. Paths from the eye find the lamp through the glass by chance only; photons start there.'
 scene ring 'builtin:ring?roughness=0.3' 0 2 \
     'A rough metal ring under a point light: its caustic is wide enough for paths from the eye, and kernels of photons blur it.'
+scene fog 'builtin:fog-box?sphere=glass&boxes=none&lamp=0.1&sigma_s=3' 1 8 \
+    'Fog around a glass sphere under a small lamp: its caustic is in the fog as well as on the floor, and photons that collide on their way show it.'
+scene haze 'builtin:passage?sigma_a=0.05&sigma_s=0.5&g=0.6' 1 4 \
+    'Haze on both sides of a narrow passage: what little light comes through lies in shafts in the air.'
 scene soup 'builtin:triangle-soup?n=300' 0 1 \
     'Opaque triangles under a uniform sky, which every technique can render; the preview lets the sky shine through everything.'
 

@@ -1,7 +1,8 @@
 //! Writes the Rust side of the shader interfaces.
 //!
 //! One module a shader, nested as the folders are; structs that blocks are made of go to `types`, and descriptor sets that a GLSL
-//! include names (`// descriptor set 2: SceneSet`) go to `sets`, once, and must be the same in every shader that uses them.
+//! include names (`// descriptor set 2: SceneSet`) go to `sets`, once, and must be the same in every shader that uses them. Two includes may
+//! share a set: of one the line says so (`// descriptor set 3 from binding 8: PhotonBeamSet`), and each has a struct of its own.
 //!
 //! The variant `driver` of a shader is the same kernel by ray queries, for pipelines that the host makes as those of the shader: it must have the same
 //! push constants, workgroup and sets but for that of the index, and no specialization constants that the shader lacks.
@@ -14,6 +15,7 @@ use super::compile::Shader;
 use super::reflect::{Binding, Interface, Member, Resource, Struct, Type, snake_case};
 
 const SET_MARK: &str = "// descriptor set ";
+const FIRST_MARK: &str = " from binding ";
 
 /// What stands for the paths of the crate in the text, until it is complete.
 const GPU: &str = "@gpu@";
@@ -34,8 +36,9 @@ pub fn generate(shaders: &[Shader], interfaces: &[Interface], paths: &Paths) -> 
     let mut all = String::new();
     for (shader, interface) in shaders.iter().zip(interfaces) {
         let named = named_sets(shader)?;
-        for (set, name) in &named {
-            let bindings: Vec<_> = interface.bindings.iter().filter(|b| b.set == *set).cloned().collect();
+        for (place, name) in &named {
+            let of_name = |binding: &&Binding| named_place(&named, binding) == Some(place);
+            let bindings: Vec<_> = interface.bindings.iter().filter(of_name).cloned().collect();
             if let Some((other, earlier)) = sets.get(name) {
                 if *earlier != bindings {
                     return Err(format!(
@@ -109,23 +112,34 @@ fn module_name(file: &str, variant: Option<&str>) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join("_")
 }
 
+/// Names of sets, by the set and the first binding that each is of.
+type NamedSets = BTreeMap<(u32, u32), String>;
+
 /// Sets that the shader's sources give a name to.
-fn named_sets(shader: &Shader) -> Result<BTreeMap<u32, String>, String> {
+fn named_sets(shader: &Shader) -> Result<NamedSets, String> {
     let mut named = BTreeMap::new();
     for (path, text) in &shader.sources {
         for mark in text.lines().filter_map(|line| line.strip_prefix(SET_MARK)) {
-            let (number, name) = mark.split_once(": ").ok_or_else(|| format!("{path}: {mark}"))?;
-            let number = number.parse().map_err(|_| format!("{path}: {mark}"))?;
+            let (place, name) = mark.split_once(": ").ok_or_else(|| format!("{path}: {mark}"))?;
+            let (set, first) = place.split_once(FIRST_MARK).unwrap_or((place, "0"));
+            let number = |digits: &str| digits.parse::<u32>().map_err(|_| format!("{path}: {mark}"));
+            let place = (number(set)?, number(first)?);
             let name = name
                 .split_whitespace()
                 .next()
                 .unwrap_or_default()
                 .trim_end_matches(['.', ','])
                 .to_owned();
-            named.insert(number, name);
+            named.insert(place, name);
         }
     }
     Ok(named)
+}
+
+/// Where the name of a binding's set stands, if it has one.
+fn named_place<'a>(named: &'a NamedSets, binding: &Binding) -> Option<&'a (u32, u32)> {
+    let before = named.range((binding.set, 0)..=(binding.set, binding.binding));
+    before.map(|(place, _)| place).next_back()
 }
 
 type Types = BTreeMap<String, Struct>;
@@ -212,7 +226,7 @@ fn shader_module(
     shader: &Shader,
     interface: &Interface,
     module: &str,
-    named: &BTreeMap<u32, String>,
+    named: &NamedSets,
     has_ray_query: bool,
 ) -> String {
     let mut text = String::new();
@@ -296,11 +310,14 @@ fn shader_module(
     let sets: std::collections::BTreeSet<u32> = interface.bindings.iter().map(|b| b.set).collect();
     for set in sets {
         let bindings: Vec<_> = interface.bindings.iter().filter(|b| b.set == set).cloned().collect();
-        match named.get(&set) {
-            Some(name) => {
-                let _ = writeln!(text, "pub use {SHADERS}::sets::{name};");
-            }
-            None => text += &rust_set(&format!("Set{set}"), set, &bindings),
+        let places: std::collections::BTreeSet<_> = bindings.iter().filter_map(|b| named_place(named, b)).collect();
+        for place in places {
+            let _ = writeln!(text, "pub use {SHADERS}::sets::{};", named[place]);
+        }
+        let own = bindings.iter().filter(|b| named_place(named, b).is_none());
+        let own: Vec<_> = own.cloned().collect();
+        if !own.is_empty() {
+            text += &rust_set(&format!("Set{set}"), set, &own);
         }
         for binding in &bindings {
             text += &block_header(binding);

@@ -1,4 +1,4 @@
-// Participating media of the scene: set 3, filled by clerestory::transport::GpuScene; twin of clerestory::scene::DensityGrid.
+// Participating media of the scene (scene/media_bindings.glsl); twin of clerestory::scene::DensityGrid.
 //
 // Only kernels that are dispatched for scenes with media use it. Everything is read by texel fetches, as in scene/bindings.glsl.
 #ifndef CLERESTORY_SCENE_MEDIA_GLSL
@@ -9,11 +9,9 @@
 #include "scene/fetches.glsl"
 #include "scene/records.glsl"
 
-// descriptor set 3: MediaSet
-
-layout(set = 3, binding = 0) uniform utextureBuffer media_records;
-layout(set = 3, binding = 1) uniform textureBuffer media_densities;  // of all grids, x fastest
-layout(set = 3, binding = 2) uniform textureBuffer media_majorants;  // greatest densities of blocks of cells
+#ifndef CLERESTORY_MEDIA_BOUND
+#include "scene/media_bindings.glsl"
+#endif
 
 uvec4 medium_quarter(uint medium, uint quarter) { return texelFetch(media_records, int(MEDIUM_QUARTERS * medium + quarter)); }
 

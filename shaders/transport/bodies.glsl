@@ -30,6 +30,9 @@ Crossing cross_surface(uint triangle_index, vec3 direction, uint interior) {
     return entering ? Crossing(around, triangle.material, boundary) : Crossing(triangle.material, around, boundary);
 }
 
+// Whether light from outside reaches the inside of a body unbent: what is inside a solid that refracts has none but that of lamps inside.
+bool is_open(uint interior) { return interior == OUTSIDE || (material_quarter(interior, 1u).w & MATERIAL_BOUNDARY) != 0u; }
+
 // Index of the medium inside a body, or NO_MEDIUM; `surrounding` is the one outside all.
 uint medium_inside(uint interior, uint surrounding) {
     if (interior == OUTSIDE) {

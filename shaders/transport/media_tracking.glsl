@@ -17,9 +17,6 @@
 const uint GRID_WALK_QUOTA = 2048u;
 // Iterations of all grid walks of the invocation so far.
 uint grid_iterations = 0u;
-// Transmittances below this are decided by roulette, with this chance to go on.
-const float RATIO_ROULETTE_BELOW = 0.1;
-const float RATIO_ROULETTE_SURVIVAL = 0.5;
 // Tentative collisions on a segment with equi-angular samples in a grid, on average and at most.
 const float AIRLIGHT_DEPTH = 96.0;
 // Least component of a direction, as a share of the largest one.

@@ -15,6 +15,9 @@
 const float EXPONENT_MAX = 80.0;
 // Below this optical depth the attenuated length is taken from its series.
 const float SERIES_DEPTH = 0.05;
+// Transmittances below this are decided by roulette, with this chance to go on.
+const float RATIO_ROULETTE_BELOW = 0.1;
+const float RATIO_ROULETTE_SURVIVAL = 0.5;
 // Density of equi-angular samples over that of collisions from which on they are taken: below, both together vary as much as collisions alone.
 const float EQUI_ANGULAR_GAIN = 0.5;
 

@@ -20,29 +20,19 @@ layout(constant_id = 27) const uint WORK_LEAST = WORK_UNIT;
 layout(constant_id = 28) const bool NUMBERED = false;
 #define CLERESTORY_NUMBERED NUMBERED
 
+// Where an earlier dispatch has handled a part of the places, as walk_resume says: rays of some have ended, or some are further on than that (PLACE_RAY_ENDED).
+const uint GOES_ON_RAYS = 1u;
+const uint GOES_ON_FURTHER = 2u;
+
 layout(push_constant, scalar) uniform Push {
     WalkKey key;
     uint surrounding;  // index of the medium outside all bodies, or NO_MEDIUM
-    uint goes_on;      // 1 where an earlier dispatch has handled a part of the places, as walk_resume says
+    uint goes_on;      // GOES_ON_*, or 0 where no place is begun
 } push;
 
 #include "transport/attribute_features.glsl"
 #include "walk/draws.glsl"
-#include "walk/candidate_alpha.glsl"
-
-const uint CANDIDATES_EXTEND = 0u;
-const uint CANDIDATES_SHADOW = 1u;
-
-// The key of a ray's candidates: (sequence, index, bounce and kind, seed).
-void begin_candidates(uint slot, uint bounce, uint kind) {
-    if (HAS_ALPHA) {
-        count_quarters(NUMBERED ? 1u : 0u);
-        candidate_key = uvec4(walk_sequence(slot), walk_index(slot), bounce * 2u + kind, push.key.seed);
-    }
-}
-
-#define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
 #define INDEX_RESUMES RESUMES
-#include "accel/index.glsl"
+#include "walk/candidate_rays.glsl"
 
 #endif

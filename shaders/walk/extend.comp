@@ -10,7 +10,7 @@
 layout(local_size_x = 64) in;
 
 #include "walk/candidates.glsl"
-#include "walk/media.glsl"
+#include "walk/closest_hit.glsl"
 
 void main() {
     uint place = gl_GlobalInvocationID.x;
@@ -18,7 +18,7 @@ void main() {
         return;
     }
     uint resume = push.goes_on != 0u ? walk_resume[place] : INDEX_START;
-    if (resume == INDEX_FINISHED) {
+    if (resume == INDEX_FINISHED || (push.goes_on == GOES_ON_FURTHER && resume >= PLACE_RAY_ENDED)) {
         return;
     }
     bool begun = has_work_left();
@@ -26,20 +26,11 @@ void main() {
     // What it carries is not read here.
     count_quarters(WALK_STATE_QUARTERS - 1u);
     WalkState walk = load_walk(slot);
-    begin_candidates(slot, walk.bounce, CANDIDATES_EXTEND);
     Hit hit = no_hit(FAR_AWAY);
     if (RESUMES && resume != INDEX_START) {
         hit = walk_hits_out[place];
     }
-    float t_min = 0.0;
-    if (HAS_MEDIA) {
-        // Behind the boundaries that the walk has passed.
-        t_min = status.rounds > 0u ? search_start(walk_medium_states[slot].start) : 0.0;
-    }
-    // One that is left for later has no direction, which ends its traversal at once.
-    vec3 direction = begun ? walk.direction : vec3(0.0);
-    uint next = closest_hit(Ray(walk.origin, t_min, direction, FAR_AWAY), RESUMES ? resume : INDEX_START, hit);
-    resume = begun ? next : resume;
+    resume = find_closest_hit(slot, walk, begun, resume, hit);
     walk_hits_out[place] = hit;
     walk_resume[place] = resume;
     count_work(index_iterations, WORK_LEAST);

@@ -27,6 +27,8 @@ const uint STALLED_SCATTER = 4u;
 
 // Stands in walk_resume for a place that a scatter stage has handled, should the stage stall elsewhere.
 const uint PLACE_SCATTERED = 0xFFFFFFFDu;
+// Where a stage finds the hits of rays itself, values from here on say how far places are whose rays have ended; rays through any index but a kd-tree never go on there.
+const uint PLACE_RAY_ENDED = 0xFFFFFFF0u;
 
 // Loop iterations of a unit of work. What takes less is not counted: it is bounded by the places of a wave.
 const uint WORK_UNIT = 64u;

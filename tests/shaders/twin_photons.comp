@@ -8,6 +8,7 @@
 #include "techniques/photon_mapping/kernel.glsl"
 #include "techniques/photon_mapping/photon_event.glsl"
 #include "techniques/photon_mapping/photon_footprint.glsl"
+#include "techniques/photon_mapping/photon_transmittance.glsl"
 
 Differentials in_differentials(uint i) { return Differentials(in3(i), in3(i + 3u), in3(i + 6u), in3(i + 9u)); }
 
@@ -165,6 +166,17 @@ void main() {
         out1(2u, photon_share(in1(12u), even2));
         out1(3u, placeless_distance2(in3(0u), in3(3u)));
         out1(4u, carried_distance2(in1(13u), in_bits(14u), in1(15u), in_bits(16u) != 0u));
+        break;
+    }
+    case 12u: {  // extinction along short beams
+        out3(0u, short_way_extinction(in3(0u), in3(3u)));
+        break;
+    }
+    case 11u: {  // steps of walks through grids
+        vec3 passed = in3(3u);
+        bool is_step = attenuate(in3(0u), in_bits(6u), in2(7u), passed);
+        out_bits(0u, is_step ? 1u : 0u);
+        out3(1u, passed);
         break;
     }
     case 7u: {  // footprints in media

@@ -14,10 +14,13 @@ fn fault(case: &HardCase, subject: &Subject, outcome: &Outcome) -> Option<String
         (Verdict::Pass, Subject::Technique { info, .. }) => info.id != "path" || case.documented.is_none(),
         (Verdict::Pass, _) => true,
         // What a technique refuses it says beforehand of the scene that the case shows; one that shows a part of the light may refuse another of
-        // the case's scenes.
-        (Verdict::Refused, Subject::Technique { info, .. }) => {
-            let shown = (case.picture)().map(|scene| (info.refusals)(&SceneProfile::of(&scene)));
-            subject.limits().is_some() || shown.is_ok_and(|reasons| !reasons.is_empty())
+        // the case's scenes. Some estimates of light in media have none for grids.
+        (Verdict::Refused, Subject::Technique { info, volume, .. }) => {
+            let shown = (case.picture)().map(|scene| SceneProfile::of(&scene));
+            let refuses = |shown: &SceneProfile| {
+                !(info.refusals)(shown).is_empty() || (volume.is_some() && shown.media.heterogeneous)
+            };
+            subject.limits().is_some() || shown.is_ok_and(|shown| refuses(&shown))
         }
         (Verdict::Refused, _) => false,
         (Verdict::Degrades, _) => {
@@ -52,10 +55,14 @@ fn check_some(kind: impl Fn(&Subject) -> bool, some: impl Fn(&HardCase) -> bool)
 }
 
 /// Subjects that have a test each; all other techniques share one.
-const ALONE: [&str; 9] = [
+const ALONE: [&str; 13] = [
     "path (sobol)",
     "path (pcg)",
     "photon",
+    "photon (beams)",
+    "photon (planes)",
+    "photon (unified)",
+    "photon (march)",
     "vpl",
     "bdpt",
     "many-light",
@@ -95,6 +102,26 @@ fn the_path_tracer_takes_the_cases_with_independent_samples() {
 #[test]
 fn photon_mapping_takes_the_cases_as_documented() {
     check_alone("photon");
+}
+
+#[test]
+fn photon_beams_take_the_cases_of_media_as_documented() {
+    check_alone("photon (beams)");
+}
+
+#[test]
+fn photon_planes_take_the_cases_of_media_as_documented() {
+    check_alone("photon (planes)");
+}
+
+#[test]
+fn photon_points_and_beams_together_take_the_cases_of_media_as_documented() {
+    check_alone("photon (unified)");
+}
+
+#[test]
+fn marches_take_the_cases_of_media_as_documented() {
+    check_alone("photon (march)");
 }
 
 #[test]

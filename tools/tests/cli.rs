@@ -403,6 +403,62 @@ fn frame_methods_are_rendered_as_other_techniques() -> Tested {
     Ok(())
 }
 
+/// Mean radiance of a picture, channel by channel.
+fn mean_radiance(path: &Path) -> Result<[f64; 3], Box<dyn std::error::Error>> {
+    let picture = exr::read(path)?;
+    let values = picture.main_layer()?.values().to_vec();
+    let pixels = (values.len() / 3) as f64;
+    let sum = |c: usize| values.iter().skip(c).step_by(3).map(|v| f64::from(*v)).sum::<f64>();
+    Ok([0, 1, 2].map(|c| sum(c) / pixels))
+}
+
+#[test]
+fn photons_through_fog_and_glass_hold_all_light() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let scene = "builtin:fog-box?sphere=glass";
+    let of = |technique: &str, spp: &str, settings: &str| -> Result<(Value, [f64; 3]), Box<dyn std::error::Error>> {
+        let picture = folder.path().join(format!("{technique}.exr"));
+        let asked = [
+            "render",
+            scene,
+            "--technique",
+            technique,
+            "--spp",
+            spp,
+            "--settings",
+            settings,
+        ];
+        let small = ["--size", "16x16", "--stats", "json", "-o", text(&picture)];
+        let output = succeed(&[&asked[..], &small[..]].concat())?;
+        Ok((json(&output.stdout)?, mean_radiance(&picture)?))
+    };
+    let (report, photons) = of("photon", "16", "{\"photons\": 16384}")?;
+    assert_eq!(
+        (&report["technique"], &report["path_set"]),
+        (&"photon".into(), &"all".into())
+    );
+    let count = |name: &str| report["counters"][name].as_u64().unwrap_or_default();
+    assert_eq!(count("photons_emitted"), 16 << 14);
+    assert_eq!(
+        count("photons_escaped") + count("photons_absorbed"),
+        count("photons_emitted")
+    );
+    for name in [
+        "photons_stored",
+        "events_stored",
+        "events_gathered",
+        "medium_collisions",
+    ] {
+        assert!(count(name) > 1000, "{name}: {report}");
+    }
+    let (_, paths) = of("path", "1024", "{}")?;
+    for (found, expected) in photons.iter().zip(paths) {
+        // Noise of some hundred thousand paths, of which few go through the sphere, and light that kernels lose by walls.
+        assert!((found / expected - 1.0).abs() < 0.05, "{photons:?}, not {paths:?}");
+    }
+    Ok(())
+}
+
 #[test]
 fn settings_reach_the_technique_and_the_reference_is_measured() -> Tested {
     let folder = tempfile::tempdir()?;

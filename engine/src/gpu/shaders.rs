@@ -32,7 +32,8 @@
 //!    - `INFO`, the reflected interface.
 //!
 //!    A set that several shaders share is declared in one include whose line `// descriptor set 1: SceneSet` names it; it is then in
-//!    [`sets`], and the build fails when two shaders disagree on it. An entry file with the line `// variant: driver` among its first, of a kernel that
+//!    [`sets`], and the build fails when two shaders disagree on it. Two includes may share a set, the second from a binding on that its line
+//!    says (`// descriptor set 3 from binding 8: PhotonBeamSet`): a dispatch is given both structs. An entry file with the line `// variant: driver` among its first, of a kernel that
 //!    traverses the ray index, is compiled once more, for ray queries: the module `<name>_driver`, which
 //!    [`Gpu::ray_query_pipeline`](super::Gpu::ray_query_pipeline) loads on devices that have them. `readonly` and `writeonly` are taken at their word by the barrier
 //!    checks, so declare them.

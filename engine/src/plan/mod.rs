@@ -53,6 +53,7 @@ pub use noise::{relative_mse_by_variance, relative_mse_of_pair};
 
 use crate::catalogue::{Role, Row};
 use crate::render::{RenderOptions, Renderer};
+use crate::scene::SceneProfile;
 use crate::techniques::{self, Bias, Card};
 use crate::transport::PathSet;
 use crate::{Error, Result};
@@ -222,7 +223,9 @@ pub fn plan_among(
         gave_up: Cell::new(false),
         patience,
     };
-    let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) = candidates(cards, &fixed).into_iter().unzip();
+    let profile = renderer.gpu_scene().profile();
+    let found = candidates(cards, &fixed, profile);
+    let (cards, mut candidates): (Vec<&Card>, Vec<Candidate>) = found.into_iter().unzip();
     let mut trials: Vec<Option<Trial<'_>>> = Vec::new();
     for (index, (candidate, card)) in candidates.iter_mut().zip(&cards).enumerate() {
         let tried = trials.iter().any(Option::is_some);
@@ -340,21 +343,23 @@ fn lacks_adaptive(card: &Card, fixed: &Value) -> Option<String> {
     asked.then(|| format!("it has no setting {ADAPTIVE}, which was asked for as {kind}"))
 }
 
-/// Every technique with each of its variants. What is fixed is fixed; variants that it makes equal are listed once.
-fn candidates<'a>(cards: &[&'a Card], fixed: &Value) -> Vec<(&'a Card, Candidate)> {
+/// Every technique with each of its variants that suits the scene. What is fixed is fixed; variants that it makes equal are listed once, and those that it excludes are not.
+fn candidates<'a>(cards: &[&'a Card], fixed: &Value, profile: &SceneProfile) -> Vec<(&'a Card, Candidate)> {
     let mut found: Vec<(&Card, Candidate)> = Vec::new();
     for &card in cards {
         let defaults = [("defaults", serde_json::json!({}))];
         let variants: Vec<(&'static str, Value)> = if card.variants.is_empty() {
             defaults.into()
         } else {
-            let each = card.variants.iter();
+            let each = card.variants.iter().filter(|variant| (variant.suits)(profile));
             each.map(|variant| (variant.name, (variant.settings)())).collect()
         };
-        for (name, settings) in variants {
+        for (place, (name, settings)) in variants.into_iter().enumerate() {
             let settings = merged(settings, fixed, card);
             let there = |(_, other): &(&Card, Candidate)| other.technique == card.id && other.settings == settings;
-            if !found.iter().any(there) {
+            // What is wrong by itself is the first one's to tell.
+            let is_sound = place == 0 || card.settings.check(&settings).is_ok();
+            if is_sound && !found.iter().any(there) {
                 found.push((card, Candidate::of(card, name, settings)));
             }
         }
@@ -433,6 +438,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/paths/automatic_choice.rs::what_cannot_be_chosen_says_why",
         "tests/tests/paths/automatic_choice.rs::what_cannot_be_made_is_no_end_of_the_choice",
         "tests/tests/paths/automatic_choice.rs::frames_too_large_for_the_device_are_no_candidates",
+        "tests/tests/paths/automatic_choice.rs::estimates_in_media_are_candidates_where_they_can_be_made",
         "tests/tests/paths/automatic_choice.rs::a_bias_beyond_the_goal_is_refused_with_its_figure",
         "tests/tests/paths/automatic_choice.rs::the_path_tracer_does_not_win_by_what_it_misses",
     ],
@@ -459,15 +465,35 @@ mod tests {
     #[test]
     fn fixed_settings_leave_fewer_candidates() {
         let path = [techniques::by_id("path").unwrap()];
-        let free = candidates(&path, &Value::Null);
+        let profile = SceneProfile::of(&crate::scene::load("builtin:cornell-box").unwrap());
+        let free = candidates(&path, &Value::Null, &profile);
         assert!(free.len() > 1, "{free:?}");
         let settings = serde_json::json!({ "sampler": "pcg", "path_set": "direct" });
-        let fixed = candidates(&path, &settings);
+        let fixed = candidates(&path, &settings, &profile);
         assert!(fixed.len() < free.len(), "{fixed:?}");
         for (_, candidate) in fixed {
             assert_eq!(candidate.settings["sampler"], "pcg");
             assert_eq!(candidate.settings["path_set"], "direct");
         }
+    }
+
+    #[test]
+    fn variants_that_do_not_suit_the_scene_are_not_tried() {
+        let photon = [techniques::by_id("photon").unwrap()];
+        let of = |address: &str, fixed: &Value| {
+            let profile = SceneProfile::of(&crate::scene::load(address).unwrap());
+            let found = candidates(&photon, fixed, &profile).into_iter();
+            found.map(|(_, candidate)| candidate.variant).collect::<Vec<_>>()
+        };
+        assert_eq!(of("builtin:cornell-box", &Value::Null), ["defaults"]);
+        let in_fog = of("builtin:fog-box", &Value::Null);
+        assert!(in_fog.len() > 1 && in_fog[0] == "defaults", "{in_fog:?}");
+        // What is asked for is tried, and as often as it differs.
+        let asked = serde_json::json!({ "volume": "march" });
+        assert_eq!(of("builtin:fog-box", &asked), ["defaults"]);
+        // Beams have no kernels that follow footprints.
+        let asked = serde_json::json!({ "volume_kernel": "footprint" });
+        assert_eq!(of("builtin:fog-box", &asked), ["defaults"]);
     }
 
     #[test]

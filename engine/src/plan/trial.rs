@@ -204,7 +204,9 @@ impl<'a> Trial<'a> {
                 reasons: vec![reason],
             }
         };
-        let mut first = trial.begin_pilot(asked, size, [0, 0])?;
+        let mut first = trial
+            .begin_pilot(asked, size, [0, 0])
+            .map_err(|error| refusal_of(card, error))?;
         if !has_paths(&first.path_set()) {
             return Ok(None);
         }
@@ -528,6 +530,19 @@ impl<'a> Trial<'a> {
             pilot_noise: self.noise().sqrt(),
         }
     }
+}
+
+/// A setting within its range that the technique cannot have in this scene is a reason against it; what is wrong in any scene was refused before.
+fn refusal_of(card: &Card, error: Error) -> Error {
+    if let Error::Setting { name, .. } = &error
+        && card.settings.has(name)
+    {
+        return Error::Unsupported {
+            technique: card.id.into(),
+            reasons: vec![error.to_string()],
+        };
+    }
+    error
 }
 
 /// Why a technique cannot be chosen, of an error that is its own; whatever else goes wrong ends the choice.

@@ -125,8 +125,8 @@ pub struct Card {
     pub refusals: fn(&SceneProfile) -> Vec<String>,
     /// Its settings, as [`settings!`](crate::settings!) declares them.
     pub settings: SettingsDecl,
-    /// Settings that an automatic choice tries ([`plan`](mod@crate::plan)): all of them give the same expected picture. The first are the
-    /// defaults.
+    /// Settings that an automatic choice tries ([`plan`](mod@crate::plan)) where they suit the scene: all of them give the same expected picture. The
+    /// first are the defaults.
     pub variants: &'static [Variant],
     /// What pilot pictures do not show of it; [`Foresight::PLAIN`], or [`Foresight::FRAMES`] for a frame method, unless it has more to say.
     pub foresight: Foresight,
@@ -141,6 +141,8 @@ pub struct Variant {
     pub name: &'static str,
     /// Settings as JSON; missing ones take their defaults.
     pub settings: fn() -> serde_json::Value,
+    /// Whether they are worth a try: not where they give the picture of the defaults to the bit, or are refused.
+    pub suits: fn(&SceneProfile) -> bool,
 }
 
 /// Makes a technique for a view, with its settings, which [`Settings::read`] makes its own struct.
@@ -151,6 +153,7 @@ impl Variant {
     pub const DEFAULTS: Self = Self {
         name: "defaults",
         settings: || serde_json::json!({}),
+        suits: |_| true,
     };
 }
 

@@ -107,6 +107,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/transport/fresnel.rs::conductors_agree_with_the_complex_form",
             "engine/src/transport/fresnel.rs::conductors_are_finite_at_the_ends_of_their_range",
             "engine/src/transport/fresnel.rs::conductors_reflect_as_published",
+            "engine/src/transport/fresnel.rs::conductors_are_numbers_in_half_precision",
             "engine/src/transport/fresnel.rs::curves_dip_where_published",
             "tests/tests/twins/fresnel_forms.rs::the_conductor_in_single_precision_is_the_complex_form",
             "tests/tests/twins/reflection.rs::fresnel_factors_agree_with_their_twins",
@@ -134,6 +135,8 @@ pub(crate) const ROWS: &[Row] = &[
 
 #[cfg(test)]
 mod tests {
+    use exr::prelude::f16;
+
     use super::super::testing::random3;
     use super::*;
 
@@ -272,6 +275,66 @@ mod tests {
                 );
             }
         }
+    }
+
+    fn root_of_half(x: f16) -> f16 {
+        f16::from_f64(x.to_f64().sqrt())
+    }
+
+    /// The operations of [`fresnel_conductor`] on half floats, each rounded to one; what is left of 1 after the cosine's square is given.
+    fn conductor_of_halves(c: f16, s2: f16, n: f16, k: f16) -> f16 {
+        let [half, two, four, tiny] = [0.5, 2.0, 4.0, LEAST_SUM].map(f16::from_f64);
+        let c2 = c * c;
+        let d = n * n - k * k - s2;
+        let ek = n * k;
+        let a2b2 = root_of_half(d * d + four * ek * ek);
+        let a2 = if d >= f16::ZERO {
+            half * (a2b2 + d)
+        } else {
+            two * ek * ek / (a2b2 - d)
+        };
+        let sum = a2b2 + c2;
+        let cross_s = two * c * root_of_half(a2);
+        let rs = (sum - cross_s) / (sum + cross_s + tiny);
+        let sum_p = c2 * a2b2 + s2 * s2;
+        let across = cross_s * s2;
+        half * (rs + rs * (sum_p - across) / (sum_p + across + tiny))
+    }
+
+    /// The single expression as it is printed, with quotients by the cosine.
+    fn printed_of_halves(c: f16, s2: f16, n: f16, k: f16) -> f16 {
+        let [half, two, four] = [0.5, 2.0, 4.0].map(f16::from_f64);
+        let t = n * n - k * k - s2;
+        let q = root_of_half(t * t + four * n * n * k * k);
+        let a = root_of_half(half * (q + t));
+        let fs = (q - two * a * c + c * c) / (q + two * a * c + c * c);
+        let (large, small) = (q + s2 * s2 / (c * c), two * a * s2 / c);
+        half * (fs + fs * large / (large + small))
+    }
+
+    /// Nothing is evaluated so, but a host's shaders may; the bounds are the published ones.
+    #[test]
+    fn conductors_are_numbers_in_half_precision() {
+        const SAMPLES: u32 = 10_000;
+        // From here on squares of the cosine's reciprocal are half floats.
+        const LEAST_COSINE: f64 = 1.0 / 256.0;
+        let mut worst = 0.0f64;
+        for metal in published::METALS {
+            let [n, k] = metal.index();
+            let [half_n, half_k] = [n, k].map(f16::from_f64);
+            for i in 0..=SAMPLES {
+                let c = f64::from(i) / f64::from(SAMPLES);
+                let half_c = f16::from_f64(c);
+                let s2 = f16::ONE - half_c * half_c;
+                let found = conductor_of_halves(half_c, s2, half_n, half_k).to_f64();
+                let exact = fresnel_conductor(c, DVec3::splat(n), DVec3::splat(k)).x;
+                assert!(found.is_finite(), "{} at {c}", metal.name);
+                worst = worst.max((found - exact).abs());
+                let printed = printed_of_halves(half_c, s2, half_n, half_k);
+                assert_eq!(printed.is_nan(), c < LEAST_COSINE, "{} at {c}", metal.name);
+            }
+        }
+        assert!(worst < 1.8e-3, "{worst}");
     }
 
     /// Whether the reflectance falls with the cosine all the way.

@@ -15,6 +15,25 @@ pub trait ArrivalStage {
     /// Those of recording.
     fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()>;
 
+    /// Whether the stage finds the closest hits of a bounce's rays itself, by [`record_with_hits`](ArrivalStage::record_with_hits).
+    fn finds_hits(&self) -> bool {
+        false
+    }
+
+    /// Records the closest hits of all places together with what [`record`](ArrivalStage::record) does there, in place of both the walker's stage and that: the first
+    /// time in a bounce, of a stage that [`finds_hits`](ArrivalStage::finds_hits). Places that it does not end at stall the wave with `STALLED_EXTEND`, as those of
+    /// `walk/extend.comp` do; `walk_resume` says where their rays go on, or, from `PLACE_RAY_ENDED` on, how far they are beyond that. The bounce then goes on by the walker's
+    /// stage and by `record`.
+    ///
+    /// # Errors
+    /// Those of recording, and [`Error::Internal`](crate::Error::Internal) for a stage that finds none.
+    fn record_with_hits(&self, _recorder: &mut Recorder, _wave: &WaveSet<'_>, _places: Places<'_>) -> Result<()> {
+        Err(crate::Error::Internal {
+            what: "arrival stage".into(),
+            fault: "finds no hits".into(),
+        })
+    }
+
     /// Sets what the stage counts to zero, in the first pass of a wave.
     ///
     /// # Errors

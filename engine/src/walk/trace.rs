@@ -5,7 +5,7 @@
 use super::walker::WalkOptions;
 use super::wave::{WaveBuffers, stage_barrier};
 use crate::Result;
-use crate::gpu::shaders::constants::{NO_MEDIUM, WORK_UNIT};
+use crate::gpu::shaders::constants::{GOES_ON_RAYS, NO_MEDIUM, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
 use crate::gpu::shaders::walk::{extend, shadow};
@@ -110,7 +110,7 @@ impl TracePipelines {
         std::iter::once(self.extend.info()).chain(shadow).collect()
     }
 
-    /// The closest hits of a wave's rays.
+    /// The closest hits of a wave's rays; `goes_on` is one of the kernel's `GOES_ON_*`, or 0.
     pub fn record_extend(
         &self,
         pass: &mut Pass<'_>,
@@ -118,7 +118,7 @@ impl TracePipelines {
         wave: &WaveSet<'_>,
         key: WalkKey,
         items: BufferView<'_>,
-        goes_on: bool,
+        goes_on: u32,
     ) -> Result<()> {
         let (index, set) = (scene.index_set(), scene.scene_set());
         pass.dispatch_indirect(&self.extend, &[wave, &index, &set], &push(scene, key, goes_on), items)?;
@@ -138,6 +138,7 @@ impl TracePipelines {
     ) -> Result<()> {
         if let Some(shadow) = &self.shadow {
             let (index, set, media) = (scene.index_set(), scene.scene_set(), scene.media_set());
+            let goes_on = if goes_on { GOES_ON_RAYS } else { 0 };
             let push = bytemuck::cast(push(scene, key, goes_on));
             pass.dispatch_indirect(shadow, &[wave, &index, &set, &media], &push, rays)?;
             stage_barrier(pass);
@@ -147,18 +148,18 @@ impl TracePipelines {
 }
 
 /// Loop iterations of a ray from which on they count as work of a submission: atomics are cheap beside them on software devices, where rays are slow.
-fn work_least(kind: DeviceKind) -> u32 {
+pub(crate) fn work_least(kind: DeviceKind) -> u32 {
     match kind {
         DeviceKind::Cpu => WORK_UNIT,
         _ => 16 * WORK_UNIT,
     }
 }
 
-/// What both stages are told; `goes_on` where an earlier dispatch has handled a part of the places.
-fn push(scene: &GpuScene, key: WalkKey, goes_on: bool) -> extend::Push {
+/// What both stages are told.
+fn push(scene: &GpuScene, key: WalkKey, goes_on: u32) -> extend::Push {
     extend::Push {
         key,
         surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
-        goes_on: goes_on.into(),
+        goes_on,
     }
 }

@@ -17,7 +17,7 @@ use super::trace::{RAY_QUOTA, TracePipelines, ray_quota};
 use super::turnover::Turnover;
 use super::wave::{Status, WaveBuffers, group_counts, indirect};
 use crate::Result;
-use crate::gpu::shaders::constants::{STALLED_NOT, WORK_UNIT};
+use crate::gpu::shaders::constants::{GOES_ON_FURTHER, GOES_ON_RAYS, STALLED_NOT, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
 use crate::gpu::{Access, DeviceKind, Gpu, Pace, PipelineInfo, Recorder, wide_counter};
@@ -449,13 +449,23 @@ impl Walker {
         for index in 0..bounces {
             let bounce = self.bounce(key, (rounds + index) as usize % 2);
             let first = if index == 0 { from } else { Next::Bounce };
-            if first.has_hits() {
-                let goes_on = first == Next::Hits;
-                let trace = if goes_on { trace } else { &self.trace };
-                self.record_hits(recorder, &bounce, trace, goes_on)?;
-            }
-            if let Some(arrival) = stages.arrival().filter(|_| first.has_arrival()) {
-                arrival.record(recorder, &bounce.wave, bounce.places)?;
+            let (arrival, goes_on) = (stages.arrival(), first == Next::Hits);
+            let finds_hits = arrival.is_some_and(|stage| stage.finds_hits());
+            let fused = arrival.filter(|_| finds_hits && first.has_hits() && !goes_on);
+            if let Some(fused) = fused {
+                fused.record_with_hits(recorder, &bounce.wave, bounce.places)?;
+            } else {
+                if first.has_hits() {
+                    let (trace, state) = match (goes_on, finds_hits) {
+                        (false, _) => (&self.trace, 0),
+                        (true, false) => (trace, GOES_ON_RAYS),
+                        (true, true) => (trace, GOES_ON_FURTHER),
+                    };
+                    self.record_hits(recorder, &bounce, trace, state)?;
+                }
+                if let Some(arrival) = arrival.filter(|_| first.has_arrival()) {
+                    arrival.record(recorder, &bounce.wave, bounce.places)?;
+                }
             }
             if !arrival_alone {
                 stages.record_scatter(recorder, &bounce)?;
@@ -490,13 +500,13 @@ impl Walker {
         self.pace.units(walks, unwatched)
     }
 
-    /// The closest hits of a bounce.
+    /// The closest hits of a bounce; `goes_on` as the kernel is told.
     fn record_hits(
         &self,
         recorder: &mut Recorder,
         bounce: &Bounce<'_>,
         trace: &TracePipelines,
-        goes_on: bool,
+        goes_on: u32,
     ) -> Result<()> {
         recorder.pass(&self.pass("extend"), |pass| {
             let items = bounce.places.items;

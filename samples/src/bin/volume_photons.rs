@@ -1,18 +1,20 @@
 //! Photons in participating media: a window on a scene whose light moves, seen by one estimate after the other, or one picture.
 //!
-//! `volume_photons [SCENE] [--volume march|ray|unified|beams|planes] [--photons N] [--radius METRES] [--turn DEGREES] [--flight METRES]` and the viewer's options, or without a
+//! `volume_photons [SCENE] [--volume march|ray|beams|planes|unified] [--photons N] [--radius METRES] [--turn DEGREES] [--flight METRES]` and the viewer's options, or without a
 //! window `volume_photons [SCENE] --picture FILE [--frames N] [--size WxH]` and these
 //!
 //! Each frame the light goes around the middle of the scene by `--turn`, its photons collide in media and land on surfaces, maps of both are built, and
 //! rays from the eye find direct light, single scattering included, and in the maps everything else. E goes on to the next estimate of what is seen in media: marched
-//! under balls, by disks across each ray, by these and beams together, and in homogeneous media by beams, the photons' whole ways, or by planes that two flights span. Space holds what moves, and the picture converges.
+//! under balls, by disks across each ray, by disks and beams weighted together, and in homogeneous media by beams alone, the photons' whole ways, or by planes that two flights span. Space holds
+//! what moves, and the picture converges.
 //! `--flight` moves the camera as in the photon viewer, `--radius` is that of kernels in media; without it small pictures choose it, once where things move.
 //! With `--picture` nothing moves unless it is told to, and the last of `--frames` frames is written.
 //!
 //! Sources: H. W. Jensen and P. H. Christensen, "Efficient Simulation of Light Transport in Scenes with Participating Media Using Photon Maps", SIGGRAPH 1998; W. Jarosz, M.
 //! Zwicker and H. W. Jensen, "The Beam Radiance Estimate for Volumetric Photon Mapping", CGF 27(2), 2008; W. Jarosz, D. Nowrouzezahrai, I. Sadeghi and H. W.
 //! Jensen, "A Comprehensive Theory of Volumetric Radiance Estimation Using Photon Points and Beams", ACM TOG 30(1), 2011; B. Bitterli and W. Jarosz, "Beyond Points and
-//! Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", ACM TOG 36(4), 2017.
+//! Beams: Higher-Dimensional Photon Samples for Volumetric Light Transport", ACM TOG 36(4), 2017; J. Křivánek, I. Georgiev, T. Hachisuka, P. Vévoda, M. Šik, D. Nowrouzezahrai and W. Jarosz,
+//! "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014.
 
 use std::path::Path;
 use std::process::ExitCode;

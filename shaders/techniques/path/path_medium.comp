@@ -7,6 +7,7 @@
 // form, that of grids is collected at tentative collisions. Light of points, spots and points of area lights is also sampled equi-angularly
 // where that helps, combined by the power heuristic. Unbiased. Light from infinity does not pass an endless medium that extinguishes.
 // Where photons have the same light (SHARES), paths have the rest of what is scattered more than once, the last time, from the light on, here.
+// Where other means have the light of edges between two scatterings up to a bound, collisions scatter what it leaves out, as surfaces do.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
@@ -27,6 +28,7 @@ layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular sample
 #include "walk/media.glsl"
 
 #include "walk/draws.glsl"
+#include "transport/edge_bound.glsl"
 #include "transport/light_choice.glsl"
 #include "transport/media_tracking.glsl"
 #include "transport/bodies.glsl"
@@ -38,6 +40,9 @@ float even2 = 0.0;
 // Share of the path in light from that squared distance that it scatters at a place of its way.
 float share_here(float light2) { return even2 != 0.0 ? eye_share(light2, abs(even2)) : 1.0; }
 
+// As in path_shade.comp.
+layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
+
 // The way from the path's start to the surface.
 struct Way {
     float start;
@@ -47,6 +52,16 @@ struct Way {
 
 // What lies before the ray's origin is moved there, so that it stays on the right side of the surface that the ray left.
 vec3 place_on_way(WalkState path, Way way, float t) { return path.origin + max(way.start + t, 0.0) * path.direction; }
+
+// Share of what a collision scatters, t from where the path was scattered last, that is the path's own beside those of other means: all where that was a mirror, or nowhere.
+float own_share(uint slot, WalkState path, float t) {
+    if (EDGE_BOUND == EDGE_UNBOUNDED || !(path.pdf > 0.0)) {
+        return 1.0;
+    }
+    // There is no cosine at the collision.
+    float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? path_departures[slot] : 1.0;
+    return 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, 1.0, t * t);
+}
 
 // Weight of light sampling of density `light_pdf` (0: of a light without extent) against the phase function's directions, which meet the light, too.
 // Equi-angular samples and collisions share it: what directions find is weighted without regard to how their place was found.
@@ -72,9 +87,6 @@ struct Segment {
     float start;
     float reach;  // FAR_AWAY: endless
 };
-
-// Whether light from outside reaches the inside of a body unbent: what is inside a solid that refracts has none but that of lamps inside.
-bool is_open(uint interior) { return interior == OUTSIDE || (material_quarter(interior, 1u).w & MATERIAL_BOUNDARY) != 0u; }
 
 // Whether light has points that samples can be taken of.
 bool has_place(uint kind) {
@@ -150,6 +162,9 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
         weight *= share_here(dot(to, to));
     }
     vec3 contribution = path.throughput * passed * scattered * seen.radiance * (phase * weight / pdf);
+    if (EDGE_BOUND != EDGE_UNBOUNDED) {
+        contribution *= own_share(slot, path, max(segment.start + t, 0.0));
+    }
     if (contribution == vec3(0.0)) {
         return false;
     }
@@ -206,6 +221,9 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     }
     if (HAS_LIGHT_TREE) {
         path_receivers[slot] = LightReceiver(at, vec3(0.0));
+    }
+    if (EDGE_BOUND == EDGE_GEOMETRY) {
+        path_departures[slot] = 1.0;
     }
     path.origin = at;
     path.direction = wi;
@@ -343,6 +361,9 @@ void main() {
     uint interior = way.interior;
     if (outcome == GRID_COLLIDED) {
         path.throughput *= weight;
+        if (EDGE_BOUND != EDGE_UNBOUNDED) {
+            path.throughput *= own_share(slot, path, max(way.start + t, 0.0));
+        }
         if (path.throughput != vec3(0.0)) {
             vec3 at = place_on_way(path, way, t);
             if (lighting) {

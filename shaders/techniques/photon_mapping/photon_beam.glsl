@@ -3,14 +3,15 @@
 // surface that the path has met, for the surface's query behind it.
 //
 // L = sum_j K(d_j / h_j) / h_j^2 tau(t_j) p(w_j, -v) Phi_j, with Phi_j the flux that the event scatters: the corrected units of the source, where the albedo stands
-// instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam.
+// instead of the scattering coefficient. Of beams L = sum_j K(d_j / h) / h tau(t_j) sigma_s p(w_j, -v) tau_j Phi_j / sin(w_j, v), with tau_j along the beam; of short ones, which end by chance as
+// flights in the band that comes farthest do, it is what other bands have less of.
 // Of planes L = sum_j tau(t_j) sigma_s^2 p(w_j', -v) tau_j' Phi_j / |v . (w_j x w_j')| with the directions w_j and w_j' of both flights, and tau_j' what is left there of other
 // bands than the one that flights end as in: without blur. One of those that a ray meets has a ray that tells whether it is seen (photon_plane_ray.glsl).
 // Where collisions are stored beside beams each has the share of the balance heuristic (point_share). Where eye paths go on, both have but the share that these leave (photons_share).
 // Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Events count in their own medium alone.
 //
 // With a queue (QUEUE) photon_beam_ways.comp has been to all places, and an invocation takes one of those that ask; without one an invocation per place first finds its way
-// (photon_beam_way.glsl). With COMPACT_PACKET defined the rays of a subgroup go through the map together, wherever any of them goes. A ray's sum has the order of the map's
+// (photon_beam_way.glsl); photon_beam_fused.comp first finds the ray's hit, too, and has a main function of its own (BEAM_FINDS_HITS). With COMPACT_PACKET defined the rays of a subgroup go through the map together, wherever any of them goes. A ray's sum has the order of the map's
 // leaves in each of these forms, and so the same bits; or the order of its records: a query that its quota stops leaves nothing and goes through all of them
 // instead (LINEAR). Rays together meet it sooner, by the steps of all: where also the submission's work is
 // used up, who is with a ray decides whether it stops, and last bits with it.
@@ -43,6 +44,8 @@ layout(constant_id = 55) const bool BEAMS = false;   // the map holds ways of ph
 layout(constant_id = 56) const bool PLANES = false;  // and planes
 layout(constant_id = 57) const bool POINTS = false;  // and collisions
 const bool WIDE = PLANES || POINTS;
+layout(constant_id = 61) const bool SHORT_WAYS = false;  // ways end by chance
+layout(constant_id = 62) const bool AFTER_FUSED = false; // goes on where photon_beam_fused.comp has stopped, with ways that may be known
 
 // Tells the words of the choice among planes from others.
 const uint PLANE_CHOICE_KEY = 0x10000000u;
@@ -85,9 +88,13 @@ bool counts_here(uint medium, uint history) {
     return counts;
 }
 
+// As long as short beams are there for a collision, so is the flight that may end in it: their shares do not depend on its length.
 float share_of_points(float flight, float sine) {
-    return point_share(mean_extinction(beam.m.sigma_t), flight, push.radius, push.radius, sine);
+    return point_share(mean_extinction(beam.m.sigma_t), SHORT_WAYS ? 0.0 : flight, push.radius, push.radius, sine);
 }
+
+// What takes from light along a beam.
+vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s, beam.m.sigma_t) : beam.m.sigma_t; }
 
 // Share of a record's light that eye paths which go on leave to photons, by the density of its phase function.
 float photons_share(uvec4 q2, float phase, float sine, bool has_beams) {
@@ -105,7 +112,7 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
         BeamMeeting at = meet_beam(beam.origin, beam.direction, b.start, way);
         float relative = at.squared / (push.radius * push.radius);
         if (at.sine > 0.0 && relative < 1.0 && at.along >= 0.0 && at.along < reach && at.t > beam.from && at.t < beam.to) {
-            vec3 passed = passed_to(at.t) * transmittance(beam.m.sigma_t, at.along);
+            vec3 passed = passed_to(at.t) * transmittance(way_extinction(), at.along);
             float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
             float phase = phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
             weight *= phase;
@@ -199,12 +206,12 @@ bool compact_visit_beam(uint record) {
 
 // Prepares the query of a place that may be asked for at all; false where it is not, or not yet.
 bool prepare_beam(uint slot, uint place, WalkState path, uint resume) {
-    if (LINEAR || QUEUE != QUEUE_SLOTS) {
+    if (LINEAR || QUEUE != QUEUE_SLOTS || (AFTER_FUSED && resume == BEAM_ASKS)) {
         resume_beam(slot, place, path);
         return true;
     }
     bool walks;
-    bool asks = begin_beam(slot, place, path, resume == BEAM_WALKING, walks);
+    bool asks = begin_beam(slot, place, path, load_hit(place), resume == BEAM_WALKING, walks);
     if (walks) {
         walk_resume[place] = BEAM_WALKING;
         count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
@@ -226,12 +233,55 @@ bool gather_events() {
         return true;
     }
     // A march's places reach as far beyond the way's ends as kernels do, and count within alone.
-    float far = min(beam.to, largest_component(beam.reach));
+    float far = min(beam.to, beam.reach);
     bool complete = compact_beam_query(event_root, Ray(beam.origin, beam.from, beam.direction, far));
     count_work(QUERY_STEP_WORK * compact_steps + GRID_ITERATION_WORK * grid_iterations, QUERY_STEP_WORK * WORK_UNIT);
     return complete;
 }
 
+// Asks for the light of a place whose query is prepared; false when a quota stops it, and nothing is added.
+bool ask_beam(uint slot, uint place, WalkState path) {
+    if (MARCHES) {
+        uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), BEAM_KEY + walk_round(slot), push.key.seed);
+        beam.offset = unit_float(pcg4d(key).w);
+    }
+    if (PLANES) {
+        beam.choice = pcg4d(uvec4(walk_sequence(slot), walk_index(slot), PLANE_CHOICE_KEY + walk_round(slot), push.key.seed));
+        beam.weight = path.throughput * (push.scale * push.plane_weight);
+        chosen.resume = PLANE_RAY_ENDED;
+        chosen.total = 0.0;
+        if (LINEAR && push.first > 0u) {
+            chosen = plane_rays[place];
+        }
+    }
+    bool complete = gather_events();
+    if (COUNT_FETCHES) {
+        COUNT_WIDE(beam_counters.nodes, compact_counters.x)
+        COUNT_WIDE(beam_counters.records, compact_records)
+        COUNT_WIDE(beam_counters.tests, compact_steps)
+    }
+    if (!complete) {
+        return false;
+    }
+    if (!LINEAR || push.first == 0u) {
+        atomicAdd(beam_counters.queries, 1u);
+        if (COUNT_FETCHES && status.rounds > 0u) {
+            atomicAdd(beam_counters.later_queries, 1u);
+        }
+    }
+    COUNT_WIDE(beam_counters.events, gathered_events)
+    // Of a query that goes through records also that there is none, for the records to come.
+    if (PLANES && (LINEAR || chosen.total > 0.0)) {
+        plane_rays[place] = chosen;
+        if (!LINEAR) {
+            walk_resume[place] = BEAM_TRACING;
+        }
+    }
+    walk_gathered[slot].radiance += path.throughput * gathered * push.scale;
+    return true;
+}
+
+#ifndef BEAM_FINDS_HITS
 void main() {
     uint place = gl_GlobalInvocationID.x + (LINEAR ? push.first_place : 0u);
     if (QUEUE != QUEUE_SLOTS) {
@@ -254,49 +304,12 @@ void main() {
     }
     uint slot = load_slot(place);
     WalkState path = load_walk(slot);
-    if (!prepare_beam(slot, place, path, resume)) {
-        return;
-    }
-    if (MARCHES) {
-        uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), BEAM_KEY + walk_round(slot), push.key.seed);
-        beam.offset = unit_float(pcg4d(key).w);
-    }
-    if (PLANES) {
-        beam.choice = pcg4d(uvec4(walk_sequence(slot), walk_index(slot), PLANE_CHOICE_KEY + walk_round(slot), push.key.seed));
-        beam.weight = path.throughput * (push.scale * push.plane_weight);
-        chosen.resume = PLANE_RAY_ENDED;
-        chosen.total = 0.0;
-        if (LINEAR && push.first > 0u) {
-            chosen = plane_rays[place];
-        }
-    }
-    bool complete = gather_events();
-    if (COUNT_FETCHES) {
-        COUNT_WIDE(beam_counters.nodes, compact_counters.x)
-        COUNT_WIDE(beam_counters.records, compact_records)
-        COUNT_WIDE(beam_counters.tests, compact_steps)
-    }
-    if (!complete) {
+    if (prepare_beam(slot, place, path, resume) && !ask_beam(slot, place, path)) {
         walk_resume[place] = BEAM_STOPPED;
         atomicAdd(status.unfinished, 1u);
         atomicMax(status.stalled, STALLED_ARRIVAL);
-        return;
     }
-    if (!LINEAR || push.first == 0u) {
-        atomicAdd(beam_counters.queries, 1u);
-        if (COUNT_FETCHES && status.rounds > 0u) {
-            atomicAdd(beam_counters.later_queries, 1u);
-        }
-    }
-    COUNT_WIDE(beam_counters.events, gathered_events)
-    // Of a query that goes through records also that there is none, for the records to come.
-    if (PLANES && (LINEAR || chosen.total > 0.0)) {
-        plane_rays[place] = chosen;
-        if (!LINEAR) {
-            walk_resume[place] = BEAM_TRACING;
-        }
-    }
-    walk_gathered[slot].radiance += path.throughput * gathered * push.scale;
 }
+#endif
 
 #endif

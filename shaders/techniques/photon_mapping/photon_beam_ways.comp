@@ -24,7 +24,7 @@ void main() {
     }
     uint slot = load_slot(place);
     bool walks;
-    bool asks = begin_beam(slot, place, load_walk(slot), resume == BEAM_WALKING, walks);
+    bool asks = begin_beam(slot, place, load_walk(slot), load_hit(place), resume == BEAM_WALKING, walks);
     walk_resume[place] = walks ? BEAM_WALKING : asks ? BEAM_ASKS : BEAM_DONE;
     count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
     if (walks) {

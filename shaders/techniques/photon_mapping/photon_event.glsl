@@ -126,6 +126,12 @@ float least_extinction(vec3 sigma_t) {
 // Extinction with which the flights of planes end: of the band through which light comes farthest, of those that scatter.
 float plane_extinction(vec3 sigma_s, vec3 sigma_t) { return least_extinction(mix(sigma_t, vec3(0.0), equal(sigma_s, vec3(0.0)))); }
 
+// What takes from a beam's light along one that ends by chance, as a flight with that extinction does: what other bands have less of.
+vec3 short_way_extinction(vec3 sigma_s, vec3 sigma_t) {
+    float least = plane_extinction(sigma_s, sigma_t);
+    return max(sigma_t, vec3(least)) - least;
+}
+
 // Where a ray meets the plane that two flights span.
 struct PlaneMeeting {
     float t;         // along the ray

@@ -23,10 +23,14 @@ bool wave_has_arrived() { return status.stalled != STALLED_EXTEND && status.stal
 
 // The way of an eye path through the medium before the surface that it has met, by place.
 struct BeamWay {
-    vec3 surface;  // what is left of light from there
-    float start;   // of the part that has not been asked for, along the ray
-    vec3 reach;    // in a grid, how far light of each band comes, along the ray, or FAR_AWAY
-    float end;     // of the part, or of the walk so far
+    vec3 surface;   // what is left of light from there, or where a walk through a grid is
+    float start;    // of the part that has not been asked for, along the ray
+    float end;      // of the part, or of the walk so far
+    // In a grid:
+    float reach;    // from where on nothing is left of light, along the ray, or FAR_AWAY
+    uint steps;     // of the walk
+    float entry;    // where its table begins, along the ray
+    float spacing;  // of the table's places
 };
 
 #endif

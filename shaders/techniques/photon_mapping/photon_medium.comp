@@ -1,6 +1,6 @@
 #version 460
 // Photons on their way through media: free flight to a collision, where it is stored and scattered, or absorbed; on through a boundary; or with what is left
-// of it to the surface, for photon_scatter.comp. Or, of media that are seen by beams, whole ways; or by planes, two flights as well.
+// of it to the surface, for photon_scatter.comp. Or, of media that are seen by beams, whole ways, or as much of them as a flight (SHORT_WAYS); or by planes, two flights as well.
 //
 // Free flights are those of eye paths (transport/medium.glsl, transport/media_tracking.glsl): analytic in homogeneous media, delta tracking in grids, one walk
 // for all bands. A collision stores the flux that it scatters; the photon goes on with the probability that leaves its largest band as it is. Where a medium
@@ -26,6 +26,8 @@ layout(local_size_x = 64) in;
 #include "transport/path_set.glsl"
 #include "transport/photon_share.glsl"
 #include "walk/media.glsl"
+
+layout(constant_id = 61) const bool SHORT_WAYS = false;  // ways end by chance
 
 layout(push_constant, scalar) uniform Push {
     WalkKey key;         // the sequence is the pass, places in it photons
@@ -86,7 +88,7 @@ uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedi
     way.medium = medium;
     way.flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
     way.bounce = HAS_CLASSES ? path_set_state(photon.bounce) : bounce;
-    way.sigma_t = m.sigma_t;
+    way.sigma_t = SHORT_WAYS ? short_way_extinction(m.sigma_s, m.sigma_t) : m.sigma_t;
     way.pieces = pieces;
     way.light2 = told_light(photon);
     photon_ways[place] = way;
@@ -242,7 +244,13 @@ void main() {
             // What comes of a way that begins at a collision is that of the plane of the way before.
             bool in_plane = STORES_PLANES && photon.pdf == PHOTON_FROM_COLLISION;
             if (path_set_bounce(photon.bounce) >= push.first_deposit && !in_plane) {
-                flags = deposit_way(slot, place, photon, medium, m, begin, reach);
+                float shown = reach;
+                if (SHORT_WAYS) {
+                    // By the number of the photon's own flight: where bands are alike the way ends where that does.
+                    uint word = sampler_bits(walk_sampler(slot, dimension)).x;
+                    shown = min(reach, flight(plane_extinction(m.sigma_s, m.sigma_t), word));
+                }
+                flags = deposit_way(slot, place, photon, medium, m, begin, shown);
             }
             if (STORES_PLANES && path_set_bounce(photon.bounce) < push.last_bounce) {
                 flags |= deposit_plane(slot, place, photon, medium, m, begin, reach, crossing.interior != OUTSIDE);

@@ -1,6 +1,6 @@
 //! The registry of hard cases: scenes, rays and directions that break naive renderers, each with what is known to be right about it.
 //!
-//! A case is judged on every subject that it concerns: each technique with each of its samplers ([`Easel`]), each ray index
+//! A case is judged on every subject that it concerns: each technique with each of its samplers, and in media with each of its estimates of them ([`Easel`]), each ray index
 //! ([`INDEXES`]) and the scattering functions ([`LOBES`]). What is known is a closed form, a well-conditioned twin of the scene, a search
 //! through all triangles, or that an error names its place; never a picture of an earlier run. Verdicts: a case passes, is refused, degrades as
 //! [`HardCase::documented`] says and no further, or fails. Both the test suite and `clerestory stability` run this table.
@@ -53,6 +53,8 @@ pub struct HardCase {
     pub documented_bias: Option<&'static str>,
     /// The same of techniques without one whose light comes by walks from the lights, which all pixels of a pass share.
     pub documented_walks: Option<&'static str>,
+    /// Has participating media: what a technique offers for them is judged, too.
+    pub of_media: bool,
     /// Judges a technique; `None` for what concerns none.
     pub techniques: Option<fn(&Easel<'_>) -> Result<Judgement>>,
     /// What every ray index has to answer as a search through all triangles does.
@@ -80,6 +82,7 @@ impl HardCase {
         documented: None,
         documented_bias: None,
         documented_walks: None,
+        of_media: false,
         techniques: None,
         rays: None,
         lobes: None,

@@ -38,7 +38,7 @@ pub type Row<'a> = (&'a HardCase, Vec<Option<Outcome>>);
 /// The page. `device` says on what the outcomes were measured, `pictured` which cases have a picture.
 pub fn markdown(device: &str, subjects: &[String], rows: &[Row<'_>], pictured: impl Fn(&HardCase) -> bool) -> String {
     let mut page = format!(
-        "# Stability\n\nHow every technique with each of its samplers, every ray index and the scattering functions (`lobes`, in f64) take the \
+        "# Stability\n\nHow every technique with each of its samplers, and in media with each of its estimates of light there, every ray index and the scattering functions (`lobes`, in f64) take the \
          hard cases. Written by `clerestory stability --markdown`, measured on {device}. Each cell has the figure that came nearest \
          to its bound: *measured* of *allowed*. **degrades** is what is documented, **refused** what a technique says beforehand that it cannot \
          model, `–` stands where a case does not concern a subject. `clerestory stability CASE --json` has the \
@@ -79,6 +79,7 @@ pub fn promises() -> String {
         let subject = Subject::Technique {
             info: card,
             sampler: None,
+            volume: None,
         };
         text += &format!("- {}: {}\n", card.id, subject.promise().unwrap_or_default());
     }

@@ -13,6 +13,8 @@ use crate::{Easel, Figure, HardCase, INDEXES, IndexCase, Judgement, LOBES};
 /// hundredth in closed rooms.
 const PHOTONS: u32 = 1 << 14;
 const SAMPLES_PER_PASS: u32 = 1024;
+/// The same with an estimate of media beside the default one: some store more than one record of each collision.
+const PHOTONS_BESIDE: u32 = PHOTONS / 2;
 /// Walks of a pass, of techniques that have virtual lights: pictures have several passes.
 const WALKS: u32 = 32;
 
@@ -29,12 +31,14 @@ pub(crate) const WAY_ROUND: &str = "; choose another technique or change the sce
 /// What a case is run against.
 #[derive(Debug, Clone, Copy)]
 pub enum Subject {
-    /// A technique with one of its samplers, where it has a choice.
+    /// A technique with one of its samplers, or of its estimates of light in media, where it has a choice.
     Technique {
         /// The technique.
         info: &'static Card,
         /// Value of its setting `sampler`.
         sampler: Option<&'static str>,
+        /// Value of its setting `volume`, where it is not the default: such a subject is judged in media alone.
+        volume: Option<&'static str>,
     },
     /// A ray index, by the twin of its kernels; the tests of the kernels hold them to it bit for bit.
     Index(&'static IndexCase),
@@ -46,8 +50,8 @@ impl Subject {
     /// Its name: `path (sobol)`, `bvh2`, `lobes`.
     pub fn name(&self) -> String {
         match self {
-            Self::Technique { info, sampler } => match sampler {
-                Some(sampler) => format!("{} ({sampler})", info.id),
+            Self::Technique { info, sampler, volume } => match sampler.or(*volume) {
+                Some(choice) => format!("{} ({choice})", info.id),
                 None => info.id.to_owned(),
             },
             Self::Index(kind) => kind.name.to_owned(),
@@ -66,19 +70,45 @@ impl Subject {
     }
 
     /// A technique's subjects: one for each sampler that its setting `sampler` offers; those with a bias, which are not judged by their noise, and those
-    /// whose pixels share the noise of a pass, have their default sampler alone. Cards of a host's own are as good as the engine's.
+    /// whose pixels share the noise of a pass, have their default sampler alone; and one for each further estimate that its setting `volume` offers. Cards of a host's own are as
+    /// good as the engine's.
     pub fn of(info: &'static Card) -> Vec<Self> {
         let infos = info.settings.infos();
         let shares_noise = shares_noise(info, &Settings::default()).unwrap_or(false);
-        match infos.iter().find(|setting| setting.name == "sampler") {
+        let mut all: Vec<Self> = match infos.iter().find(|setting| setting.name == "sampler") {
             Some(setting) if matches!(info.bias, Bias::Unbiased) && !shares_noise => {
                 let subject = |sampler: &&'static str| Self::Technique {
                     info,
                     sampler: Some(*sampler),
+                    volume: None,
                 };
                 setting.names.iter().map(subject).collect()
             }
-            _ => vec![Self::Technique { info, sampler: None }],
+            _ => vec![Self::Technique {
+                info,
+                sampler: None,
+                volume: None,
+            }],
+        };
+        if let Some(setting) = infos.iter().find(|setting| setting.name == "volume") {
+            let others = setting.names.iter().filter(|name| setting.default != **name);
+            all.extend(others.map(|volume| Self::Technique {
+                info,
+                sampler: None,
+                volume: Some(*volume),
+            }));
+        }
+        all
+    }
+
+    /// What of an error says that it refuses a case by its setting `volume`.
+    fn refusal_by_estimate(&self, error: &Error) -> Option<String> {
+        match (self, error) {
+            (Self::Technique { volume: Some(_), .. }, Error::Setting { name, cause, .. }) if name == "volume" => {
+                // Reasons of a refusal are parted by semicolons.
+                Some(format!("its estimates of light in media {}", cause.replace(';', ",")))
+            }
+            _ => None,
         }
     }
 
@@ -131,7 +161,7 @@ impl Subject {
     /// Whether a case concerns it.
     pub fn concerns(&self, case: &HardCase) -> bool {
         match self {
-            Self::Technique { .. } => case.techniques.is_some(),
+            Self::Technique { volume, .. } => case.techniques.is_some() && (volume.is_none() || case.of_media),
             Self::Index(_) => case.rays.is_some(),
             Self::Lobes => case.lobes.is_some(),
         }
@@ -223,14 +253,19 @@ fn lack(gpu: &Gpu, case: &HardCase, subject: &Subject, judgement: &Judgement) ->
 
 /// Runs a case on a subject; `None` when it does not concern it.
 pub fn judge(gpu: &Gpu, case: &HardCase, subject: &Subject) -> Option<Outcome> {
+    if !subject.concerns(case) {
+        return None;
+    }
     let judged = match subject {
-        Subject::Technique { info, sampler } => {
-            let sampler = sampler.map(|sampler| ("sampler", sampler));
-            (case.techniques?)(
-                &sampler
-                    .into_iter()
-                    .fold(easel_of(gpu, info), |easel, (name, value)| easel.with(name, value)),
-            )
+        Subject::Technique { info, sampler, volume } => {
+            let mut easel = easel_of(gpu, info);
+            if let Some(sampler) = sampler {
+                easel = easel.with("sampler", *sampler);
+            }
+            if let Some(volume) = volume {
+                easel = easel.with("volume", *volume).with("photons", PHOTONS_BESIDE);
+            }
+            (case.techniques?)(&easel)
         }
         Subject::Index(kind) => crate::rays::judge(kind, &(case.rays?)()),
         Subject::Lobes => {
@@ -286,10 +321,16 @@ fn outcome(gpu: &Gpu, case: &HardCase, subject: &Subject, judged: Result<Judgeme
             outcome.verdict = Verdict::Refused;
             outcome.reason = Some(reasons.join("; ") + WAY_ROUND);
         }
-        Err(error) => {
-            outcome.measured = "error".into();
-            outcome.reason = Some(error.to_string());
-        }
+        Err(error) => match subject.refusal_by_estimate(&error) {
+            Some(reason) => {
+                outcome.verdict = Verdict::Refused;
+                outcome.reason = Some(reason + WAY_ROUND);
+            }
+            None => {
+                outcome.measured = "error".into();
+                outcome.reason = Some(error.to_string());
+            }
+        },
     }
     outcome
 }

@@ -35,10 +35,38 @@ fn every_case_says_what_it_is_and_has_a_judge() {
         .count();
     assert_eq!(files, all().len() + 1, "one file each, and the list");
     let names: Vec<String> = subjects().iter().map(Subject::name).collect();
+    for name in [
+        "path (sobol)",
+        "path (pcg)",
+        "photon",
+        "photon (beams)",
+        "photon (march)",
+    ] {
+        assert!(names.contains(&name.to_owned()), "{name}: {names:?}");
+    }
     assert!(
-        names.contains(&"path (sobol)".to_owned()) && names.contains(&"path (pcg)".to_owned()),
-        "{names:?}"
+        !names.contains(&"photon (ray)".to_owned()),
+        "the default twice: {names:?}"
     );
+}
+
+#[test]
+fn estimates_of_media_are_judged_where_there_are_some() {
+    let of_media = |subject: &Subject| matches!(subject, Subject::Technique { volume: Some(_), .. });
+    for case in all() {
+        let scene = (case.picture)().unwrap_or_else(|error| panic!("{}: {error}", case.name));
+        let shows_media = clerestory::scene::SceneProfile::of(&scene).media.any();
+        assert_eq!(case.of_media, shows_media, "{}", case.name);
+        for subject in subjects().iter().filter(|subject| of_media(subject)) {
+            assert_eq!(
+                subject.concerns(case),
+                case.of_media,
+                "{}: {}",
+                case.name,
+                subject.name()
+            );
+        }
+    }
 }
 
 #[test]

@@ -43,12 +43,17 @@ fn without_a_reflector_there_is_no_map() {
         let hybrid = rendered(&shiny, "impostor", SIZE, 8, json!({"side": 64}));
         assert!(names(&hybrid).iter().any(|name| name == "impostor: reflect"));
         let lean = rendered(&shiny, "impostor", SIZE, 8, json!({"side": 64, "texels": "normals"}));
-        // Three numbers a texel, and four more where there are distances, with planes, or two with normals.
+        let bare = rendered(&shiny, "impostor", SIZE, 8, json!({"side": 64, "texels": "distances"}));
+        // Three numbers a texel, and four more where there are distances, with planes, two with normals, or one alone.
         let bytes = |rendered: &Rendered| rendered.report.counters["map_bytes"];
         assert_eq!(
-            [bytes(&classical), bytes(&hybrid), bytes(&lean)],
-            [12, 28, 20].map(|texel| 64 * 64 * texel)
+            [&classical, &hybrid, &lean, &bare].map(bytes),
+            [12, 28, 20, 16].map(|texel| 64 * 64 * texel)
         );
+        // Nobody draws normals unasked.
+        let skips_normals =
+            [&hybrid, &bare].map(|found| found.report.skipped.iter().any(|skipped| skipped.what == "normals"));
+        assert_eq!(skips_normals, [false, true]);
         // Planes and normals show the same, but where rounding chooses the texel.
         let pairs = layer(&hybrid, "radiance").iter().zip(layer(&lean, "radiance"));
         let differs = pairs.filter(|&(a, b)| (a - b).abs() > 1e-3 * (1.0 + b.abs())).count();

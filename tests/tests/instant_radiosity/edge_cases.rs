@@ -4,6 +4,7 @@ use super::*;
 use clerestory::Error;
 use clerestory::gpu::{GpuOptions, Lesser};
 use clerestory::render::{RenderOptions, Renderer};
+use clerestory::scene::Environment;
 use clerestory_tests::render::{camera_down, floor};
 use clerestory_tests::{assert_no_messages, gpu_with};
 
@@ -220,7 +221,9 @@ fn what_cannot_be_modelled_is_refused_by_name() {
     with_gpu(|gpu| {
         let mut unlit = room();
         unlit.materials[0].unlit = true;
-        for (scene, word) in [(builtin("builtin:fog-box"), "media"), (unlit, "unlit")] {
+        let mut sky = builtin("builtin:fog-box?fill=everywhere");
+        sky.environment = Some(Environment::uniform(Vec3::ONE));
+        for (scene, word) in [(sky, "media"), (unlit, "unlit")] {
             let options = RenderOptions {
                 technique: Some("vpl".into()),
                 ..RenderOptions::default()

@@ -8,6 +8,7 @@ mod agreement;
 mod bounds;
 mod edge_cases;
 mod many_light;
+mod media;
 mod scattering;
 mod selection;
 mod walks;

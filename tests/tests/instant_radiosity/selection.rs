@@ -210,11 +210,19 @@ fn prints_its_hash_when_asked() {
         return;
     }
     let gpu = gpu();
-    let settings = VirtualLightSettings { walks: 64, ..cuts(8) };
-    let (radiance, counts) = picture(&gpu, &room(), &settings, 2);
-    let counted = [counts.gather.nodes, counts.gather.shadow_rays];
-    let halves = counted.iter().flat_map(|count| [*count as u32, (*count >> 32) as u32]);
-    print_hash(bits(&radiance).into_iter().chain(halves));
+    let all_lights = VirtualLightSettings {
+        selection: Selection::All,
+        ..cuts(8)
+    };
+    let mut all = Vec::new();
+    for settings in [cuts(8), by_potential(0.7), all_lights] {
+        let settings = VirtualLightSettings { walks: 64, ..settings };
+        let (radiance, counts) = picture(&gpu, &room(), &settings, 2);
+        let counted = [counts.gather.nodes, counts.gather.shadow_rays];
+        let halves = counted.iter().flat_map(|count| [*count as u32, (*count >> 32) as u32]);
+        all.extend(bits(&radiance).into_iter().chain(halves));
+    }
+    print_hash(all);
     clerestory_tests::assert_no_messages(&gpu);
 }
 

@@ -56,7 +56,7 @@ fn texels_of_planes_and_of_normals_find_the_same() {
     });
 }
 
-/// Four bytes a texel and layer for distances alone; where normals were asked for, sixteen for planes or eight for normals.
+/// Four bytes a texel and layer for distances alone; where there are normals, sixteen for planes, eight for normals, and four where they are left out.
 #[test]
 fn distances_have_a_buffer_of_their_own() {
     with_gpu(|gpu| {
@@ -66,11 +66,16 @@ fn distances_have_a_buffer_of_their_own() {
             });
             Impostor::with_texels(gpu, &image.unwrap(), texels).unwrap().bytes()
         };
-        for texels in [ImpostorTexels::Planes, ImpostorTexels::Normals] {
+        for texels in [
+            ImpostorTexels::Planes,
+            ImpostorTexels::Normals,
+            ImpostorTexels::Distances,
+        ] {
             assert_eq!(bytes(1, false, texels), 6 * 16 * 16 * 4, "{texels:?}");
         }
         assert_eq!(bytes(3, true, ImpostorTexels::Planes), 4 * 3 * 6 * 16 * 16 * 4);
         assert_eq!(bytes(3, true, ImpostorTexels::Normals), 2 * 3 * 6 * 16 * 16 * 4);
+        assert_eq!(bytes(3, true, ImpostorTexels::Distances), 3 * 6 * 16 * 16 * 4);
     });
 }
 

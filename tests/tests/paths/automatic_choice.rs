@@ -513,6 +513,55 @@ fn frames_too_large_for_the_device_are_no_candidates() {
     });
 }
 
+// Photons' ways and planes are candidates in fog; in a grid they are none, and no end of the choice where they were asked for.
+#[test]
+fn estimates_in_media_are_candidates_where_they_can_be_made() {
+    with_gpu(|gpu| {
+        let [path, photon] = ["path", "photon"].map(|id| techniques::by_id(id).unwrap());
+        let plan_of = |address: &str, cards: &[&Card], settings: serde_json::Value| {
+            let renderer = Renderer::new(gpu, &scene::load(address).unwrap()).unwrap();
+            let options = RenderOptions {
+                technique: None,
+                settings: settings.into(),
+                size: [8, 8],
+                ..options()
+            };
+            // The first that can is tried, and nothing more.
+            plan_among(&renderer, cards, &options, goal(0.5), &mut || false).unwrap()
+        };
+        let estimates = |plan: &clerestory::plan::Plan| {
+            let photons = plan
+                .candidates
+                .iter()
+                .filter(|candidate| candidate.technique == "photon");
+            photons
+                .map(|candidate| candidate.settings.get("volume").cloned().unwrap_or_default())
+                .collect::<Vec<_>>()
+        };
+        let settings = serde_json::json!({ "photons": 1024 });
+        let in_fog = plan_of("builtin:fog-box?boxes=none", &[photon], settings.clone());
+        assert_eq!(
+            estimates(&in_fog),
+            [
+                serde_json::Value::Null,
+                "beams".into(),
+                "planes".into(),
+                "unified".into()
+            ]
+        );
+        let in_a_grid = plan_of("builtin:smoke?size=8", &[photon], settings);
+        assert_eq!(estimates(&in_a_grid), [serde_json::Value::Null]);
+        for volume in ["beams", "planes"] {
+            let settings =
+                serde_json::json!({ "photons": 1024, "volume": volume, "sampler": "pcg", "roulette_start": 4 });
+            let plan = plan_of("builtin:smoke?size=8", &[photon, path], settings);
+            assert_eq!(plan.choice().technique, "path", "{plan:?}");
+            let reason = &plan.candidates[0].reason;
+            assert!(reason.contains("volume") && reason.contains("homogeneous"), "{reason}");
+        }
+    });
+}
+
 #[test]
 fn the_path_tracer_does_not_win_by_what_it_misses() {
     with_gpu(|gpu| {

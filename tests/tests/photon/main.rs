@@ -12,6 +12,7 @@ mod flux;
 mod footprints;
 mod furnace;
 mod glow;
+mod grid_transmittance;
 mod lights;
 mod maps;
 mod materials;
@@ -21,14 +22,20 @@ mod queues;
 mod scale;
 mod settings;
 mod shared_paths;
+mod short_beams;
 mod sphere;
 mod traps;
 mod unified;
 mod volume;
+mod volume_counts;
+mod volume_extremes;
 mod volume_footprints;
 mod volume_kernels;
 mod volume_queues;
+mod volume_refusals;
+mod volume_stages;
 mod volume_truths;
+mod without;
 
 use std::f64::consts::PI;
 

@@ -11,7 +11,7 @@ use clerestory::techniques::photon_mapping::kernel::{
 };
 use clerestory::techniques::photon_mapping::{MapBuild, MapContents, map_contents};
 use clerestory_tests::random::Random;
-use clerestory_tests::render::builtin;
+use clerestory_tests::render::{builtin, point_triangle};
 use clerestory_tests::{gpu_with, with_gpu};
 
 use super::*;
@@ -205,6 +205,8 @@ fn device_maps_of_scenes_are_the_twins_and_pictures_are_equal() {
             Material::lambert("wall", Vec3::ZERO),
         );
         add_point(&mut dark, Vec3::new(0.3, 1.5, 0.2), Vec3::splat(20.0));
+        // Without a material that may be diffuse there would be no map.
+        point_triangle(&mut dark, Material::lambert("grey", Vec3::splat(0.5)), Vec3::ZERO);
         for (scene, settings, is_empty) in [
             (&glass, &footprints, false),
             (&glass, &nearest, false),

@@ -5,7 +5,7 @@ use super::*;
 use clerestory::gpu::{GpuOptions, Lesser, OptionalFeatures};
 use clerestory::techniques::photon_mapping::{GatherCounts, MapQueue};
 use clerestory_tests::child::{hash_in_child, print_hash};
-use clerestory_tests::render::builtin;
+use clerestory_tests::render::{builtin, point_triangle};
 use clerestory_tests::{gpu, gpu_with, with_gpu};
 
 /// Set in the processes that only print their pictures' hash.
@@ -216,6 +216,8 @@ fn queues_may_stay_empty() {
         mirrors.name = "mirrors".into();
         mirrors.meshes.pop();
         mirrors.instances.pop();
+        // Without a material that may be diffuse there would be no map.
+        point_triangle(&mut mirrors, Material::lambert("grey", Vec3::splat(0.7)), Vec3::ZERO);
         // A map that nobody looks at.
         let mut away = seen_little();
         away.name = "looking away".into();

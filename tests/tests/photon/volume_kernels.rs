@@ -6,7 +6,6 @@ use clerestory::Error;
 use clerestory::accel::sphere::closest_approach;
 use clerestory::scene::{Phase, Projection};
 use clerestory::techniques::photon_mapping::kernel::kernel_profile;
-use clerestory::techniques::photon_mapping::volume::neighbor::NEIGHBORS;
 use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
 use clerestory::transport::phase::phase_function;
 use clerestory_tests::render::{builtin, cuboid, medium};
@@ -214,14 +213,21 @@ fn kernels_by_neighbours_hold_so_many() {
             ..automatic(VolumeEstimate::Ray, 1 << 10)
         };
         let (events, _) = all_events(gpu, &scene, &settings, 0);
-        assert!(events.len() > 1500);
-        for event in events.iter().step_by(31).map(|e| e.event) {
-            let others = events
-                .iter()
-                .filter(|other| other.event.position.distance(event.position) < event.radius);
-            // Itself, and all before the last one, which lies on the rim.
-            let inside = others.count();
-            assert!(inside.abs_diff(NEIGHBORS) <= 1, "{inside}");
+        assert!(settings.volume_neighbors == 85 && events.len() > 1500);
+        for neighbors in [85, 117, 1] {
+            let settings = PhotonSettings {
+                volume_neighbors: neighbors,
+                ..settings.clone()
+            };
+            let (events, _) = all_events(gpu, &scene, &settings, 0);
+            for event in events.iter().step_by(31).map(|e| e.event) {
+                let others = events
+                    .iter()
+                    .filter(|other| other.event.position.distance(event.position) < event.radius);
+                // Itself, and all before the last one, which lies on the rim.
+                let inside = others.count();
+                assert!(inside.abs_diff(neighbors as usize) <= 1, "{neighbors}: {inside}");
+            }
         }
         // A later pass has other photons and narrower kernels.
         let (later, _) = all_events(gpu, &scene, &settings, 9);

@@ -79,7 +79,7 @@ fn expect_alike(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, forms: &[Fo
 }
 
 /// Kernels of a radius, all light from the maps, what is fetched counted.
-fn asked(photons: u32, volume_radius: f32) -> PhotonSettings {
+pub(super) fn asked(photons: u32, volume_radius: f32) -> PhotonSettings {
     PhotonSettings {
         volume_radius,
         samples_per_pass: SAMPLES,
@@ -102,7 +102,7 @@ fn add_absorbing(scene: &mut Scene, lower: Vec3, upper: Vec3) {
 }
 
 /// A box of a medium with one that scatters nothing beside it, both seen from above with the floor around them: some rays ask, and not all of a subgroup.
-fn boxes(of: Medium) -> Scene {
+pub(super) fn boxes(of: Medium) -> Scene {
     let mut scene = lit_box(of);
     add_absorbing(&mut scene, Vec3::new(0.55, -0.4, -0.45), Vec3::new(0.85, 0.4, 0.45));
     scene.cameras = vec![camera_down(0.9, 5.0)];
@@ -232,7 +232,7 @@ fn queues_and_packets_take_rays_that_a_quota_stops() {
 }
 
 /// A grid of which next to nothing is dense, with a box that scatters nothing beside it.
-fn sparse() -> Scene {
+pub(super) fn sparse() -> Scene {
     let mut scene = Scene {
         name: "sparse grid".into(),
         ..Scene::default()

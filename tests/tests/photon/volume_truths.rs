@@ -30,29 +30,36 @@ pub(super) fn exactly(value: f64) -> Mean {
     Mean { value, variance: 0.0 }
 }
 
+/// A slab of optical depth 1 and albedo 0.9 under a beam of irradiance 1 from above. What leaves by its sides is below 10⁻³ where it is seen.
+pub(super) fn slab() -> Scene {
+    const HALF: f32 = 8.0;
+    let mut scene = Scene {
+        name: "slab".into(),
+        ..Scene::default()
+    };
+    scene.media.push(medium(1.0, 0.9, Phase::Isotropic));
+    let boundary = scene.add_material(Material {
+        name: "boundary".into(),
+        boundary: true,
+        interior: Some(0),
+        ..Material::default()
+    });
+    let (low, high) = (Vec3::new(-HALF, 0.0, -HALF), Vec3::new(HALF, 1.0, HALF));
+    scene.place(cuboid("slab", boundary, low, high));
+    let (direction, irradiance) = (Vec3::NEG_Y, Vec3::ONE);
+    scene.add_light("beam", LightKind::Directional { direction, irradiance });
+    scene
+}
+
+/// Its faces, where from and in which direction they are seen, and the radiance there.
+pub(super) const SLAB_FACES: [(&str, DVec3, f64, f64); 2] =
+    [("lit", DVec3::NEG_Y, 2.0, 0.066845), ("far", DVec3::Y, -1.0, 0.060563)];
+
 #[test]
 fn slabs_have_the_radiance_of_the_tables() {
     with_gpu(|gpu| {
-        // A slab of optical depth 1 and albedo 0.9 under a beam of irradiance 1 from above. What leaves by its sides is below 10⁻³ where it is seen.
-        const HALF: f32 = 8.0;
-        let mut scene = Scene {
-            name: "slab".into(),
-            ..Scene::default()
-        };
-        scene.media.push(medium(1.0, 0.9, Phase::Isotropic));
-        let boundary = scene.add_material(Material {
-            name: "boundary".into(),
-            boundary: true,
-            interior: Some(0),
-            ..Material::default()
-        });
-        let (low, high) = (Vec3::new(-HALF, 0.0, -HALF), Vec3::new(HALF, 1.0, HALF));
-        scene.place(cuboid("slab", boundary, low, high));
-        let (direction, irradiance) = (Vec3::NEG_Y, Vec3::ONE);
-        scene.add_light("beam", LightKind::Directional { direction, irradiance });
-        for (face, forward, height, expected) in
-            [("lit", DVec3::NEG_Y, 2.0, 0.066845), ("far", DVec3::Y, -1.0, 0.060563)]
-        {
+        let mut scene = slab();
+        for (face, forward, height, expected) in SLAB_FACES {
             scene.cameras = vec![parallel(DVec3::new(0.0, height, 0.0), forward, 2.0)];
             for volume in ESTIMATES {
                 if volume == VolumeEstimate::Planes {

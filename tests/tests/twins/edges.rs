@@ -226,6 +226,57 @@ fn what_a_bound_leaves_of_a_wall_is_the_published_table() {
     });
 }
 
+/// The faces of a cube of 2 m that emit and reflect nothing, as virtual lights of what their parts emit: anywhere inside, and whichever way a surface faces there, as much arrives as
+/// they emit.
+#[test]
+fn faces_that_emit_bring_their_own_emission_inside() {
+    const PARTS: u32 = 64;
+    with_gpu(|gpu| {
+        let emission = 3.0;
+        let part = 2.0 / f64::from(PARTS);
+        let middle = |i: u32| (f64::from(i) + 0.5) * part - 1.0;
+        let mut random = Random(23);
+        let mut receivers: Vec<(DVec3, DVec3)> = (0..3)
+            .map(|_| {
+                let place = 0.5 * random.vector().as_dvec3();
+                (place, random.direction().as_dvec3())
+            })
+            .collect();
+        // In the middle of a face, which sees the five others.
+        receivers.push((DVec3::Y, DVec3::NEG_Y));
+        for (place, normal) in receivers {
+            let mut weighted = Vec::new();
+            for axis in 0..3 {
+                for side in [-1.0, 1.0] {
+                    for i in 0..PARTS * PARTS {
+                        let mut light = DVec3::ZERO;
+                        light[axis] = side;
+                        let inwards = -light;
+                        light[(axis + 1) % 3] = middle(i % PARTS);
+                        light[(axis + 2) % 3] = middle(i / PARTS);
+                        let way = place - light;
+                        let squared = way.length_squared();
+                        let unit = way / squared.sqrt();
+                        let (leaves, arrives) = (inwards.dot(unit), -normal.dot(unit));
+                        if leaves > 0.0 && arrives > 0.0 {
+                            weighted.push(([leaves, arrives, squared], emission * part * part / PI));
+                        }
+                    }
+                }
+            }
+            expect_sum(
+                gpu,
+                &format!("faces that emit {emission} W/m², at {place} towards {normal}"),
+                EdgeBound::Unbounded,
+                &weighted,
+                |[g, _]| g,
+                emission,
+                0.01 * emission,
+            );
+        }
+    });
+}
+
 /// Virtual lights of a flux of 1 in all, evenly over a unit square: what they bring to another one is the form factor.
 #[test]
 fn squares_have_their_form_factors() {

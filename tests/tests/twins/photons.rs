@@ -1,7 +1,7 @@
 //! Photon differentials, kernels of photons and their records.
 
 use clerestory::gpu::shaders::constants::{
-    EVENT_LEAF_END, PHOTON_BOUNCE_SHIFT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS,
+    EVENT_LEAF_END, PHOTON_BOUNCE_SHIFT, PHOTON_DIRECTION_BITS, PHOTON_LEAF_END, PHOTON_NORMAL_BITS, WAY_STEPS,
 };
 use clerestory::techniques::photon_mapping::kernel::{
     KernelProfile, KernelSettings, KernelShape, PhotonKernel, PhotonRecord, kernel_area, kernel_extent, kernel_profile,
@@ -17,6 +17,8 @@ use clerestory::techniques::photon_mapping::volume::footprint::{
 use clerestory::techniques::photon_mapping::volume::plane::{
     PhotonPlane, is_plane, least_extinction, meet_plane, pack_plane, plane_extinction, unpack_plane,
 };
+use clerestory::techniques::photon_mapping::volume::transmittance::attenuate;
+use clerestory::techniques::photon_mapping::volume::ways::short_way_extinction;
 use clerestory::transport::differentials::{
     Differentials, area_light_differentials, camera_differentials, diffuse_reemission, emission_differentials,
     guard_differentials, normal_derivatives, parallel_beam_differentials, reflect_differentials, refract_differentials,
@@ -775,5 +777,55 @@ fn planes_agree_with_their_twins() {
                 case.0
             );
         }
+    });
+}
+
+#[test]
+fn steps_through_grids_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(44, |r| {
+            let real: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 0.02, 0.2, 0.7, 1.0]) * r.range(0.9, 1.0));
+            let passed: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 0.05, 0.3, 1.0]) * r.range(0.9, 1.0));
+            let mut all = real.to_vec();
+            all.extend(passed);
+            all.extend([code(r.below(WAY_STEPS as usize)), r.unit(), r.unit()]);
+            all
+        });
+        let results = twin_photons(gpu, 11, &table, &[]);
+        let mut steps = 0;
+        for (case, result) in table.iter().zip(&results) {
+            let x = case.0.map(f64::from);
+            let (is_step, passed) = attenuate(v3(&x, 0), case.0[6].to_bits(), [x[7], x[8]], v3(&x, 3));
+            assert_eq!(result.bits(0), u32::from(is_step), "{:?}", case.0);
+            steps += u32::from(is_step);
+            for band in 0..3 {
+                let found = f64::from(result.0[1 + band]);
+                // A quotient taken from one, of what has passed at most, and doubled.
+                assert!(
+                    (found - passed[band]).abs() <= 16.0 * U,
+                    "{:?}: {found}, {passed}",
+                    case.0
+                );
+            }
+        }
+        assert!(steps > 300, "{steps}");
+    });
+}
+
+#[test]
+fn short_ways_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(43, |r| {
+            let scatters: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 0.25, 0.5]));
+            let mut all = scatters.to_vec();
+            // One band at least.
+            all[0] = all[0].max(0.25);
+            all.extend(scatters.map(|sigma| sigma.max(0.25) + r.choose(&[0.0, 0.1, 3.0, 100.0])));
+            all
+        });
+        let results = twin_photons(gpu, 12, &table, &[]);
+        judge("short beams", &table, &results, ulps(2.0, 2.0, 0.0), 6, |x| {
+            short_way_extinction(v3(x, 0), v3(x, 3)).to_array().to_vec()
+        });
     });
 }

@@ -60,7 +60,7 @@ pub struct Experiment {
     pub title: String,
     /// What is compared with which oracle, on which inputs, and what counts as good: two or three sentences.
     pub about: String,
-    /// Why criteria of a sweep fail. Measures say so in their notes.
+    /// Why criteria fail; a page has it below its verdicts.
     #[serde(default)]
     pub causes: String,
     /// Ids of the catalogue's rows that it measures.

@@ -16,7 +16,7 @@ use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu,
 use crate::maps::is_unit;
 use crate::{Error, Result};
 
-/// An [`ImpostorImage`] in the device's memory: four bytes a texel and layer for distances alone, with normals sixteen or eight ([`ImpostorTexels`]).
+/// An [`ImpostorImage`] in the device's memory: four bytes a texel and layer for distances alone, with normals sixteen or eight where they are kept ([`ImpostorTexels`]).
 #[derive(Debug)]
 pub struct Impostor {
     gpu: Gpu,
@@ -51,11 +51,12 @@ impl Impostor {
             extent: image.extent(),
         };
         let name = "impostor: texels";
-        let planes = match texels {
-            ImpostorTexels::Planes => image.planes(),
-            ImpostorTexels::Normals => None,
+        let (planes, normals) = match texels {
+            ImpostorTexels::Planes => (image.planes(), None),
+            ImpostorTexels::Normals => (None, image.normals()),
+            ImpostorTexels::Distances => (None, None),
         };
-        let (holds, texels) = match (planes, image.normals()) {
+        let (holds, texels) = match (planes, normals) {
             (Some(planes), _) => {
                 let texels = gpu.texels_with(name, Category::Light, vk::Format::R32G32B32A32_UINT, &planes);
                 (IMPOSTOR_HOLDS_PLANE, texels)

@@ -7,7 +7,7 @@
 //!
 //! A ray begins at x, from the map's place o, in the unit direction r; both are in the map's axes. Where to find what:
 //!
-//! - [`ImpostorImage`]: distances and normals on the host, [`Impostor`] on the device, whose texels hold planes or normals ([`ImpostorTexels`]);
+//! - [`ImpostorImage`]: distances and normals on the host, [`Impostor`] on the device, whose texels hold planes, normals or distances alone ([`ImpostorTexels`]);
 //! - [`ImpostorSettings`]: the method and its steps; [`ImpostorImage::search`] and [`Impostor::search`]: what rays meet, one by one and in batches;
 //! - [`proxy`]: spheres, boxes and a hemisphere in place of distances; [`places`]: which maps serve a point;
 //! - [`views`]: several maps together, blended by what each of them sees;

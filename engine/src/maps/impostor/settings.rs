@@ -79,7 +79,7 @@ impl fmt::Display for SearchMethod {
     }
 }
 
-/// What a texel of a map with normals holds on the device. Searches find the same in both, but for rounding.
+/// What a texel holds on the device; of a map without normals the distance alone, whatever is said. Searches find the same in planes and normals, but for rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImpostorTexels {
@@ -88,6 +88,8 @@ pub enum ImpostorTexels {
     Planes,
     /// Distance and normal, eight bytes, of which each look-up makes the plane.
     Normals,
+    /// The distance of the texel's middle, four bytes, which look-ups take for all of it: searches are off by up to half a texel.
+    Distances,
 }
 
 /// Settings of a search.

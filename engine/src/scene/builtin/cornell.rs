@@ -46,11 +46,18 @@ pub(super) const SPHERE: Parameter = Parameter::choice(
     "a sphere of radius 0.08 m above the place of the short block",
 );
 
+const FRONT: Parameter = Parameter::choice(
+    "front",
+    "open",
+    &["open", "glass"],
+    "nothing before the box, or all of it full of glass, whose front is its only interface",
+);
+
 pub const CORNELL_BOX: Entry = Entry {
     name: "cornell-box",
     summary: "The measured Cornell box: two blocks in a box with one red and one green wall, lit from the ceiling.",
-    parameters: &[LIGHT_RADIANCE, SOURCE, LAMP, BOXES, SPHERE],
-    build,
+    parameters: &[LIGHT_RADIANCE, SOURCE, LAMP, BOXES, SPHERE, FRONT],
+    build: build_with_front,
 };
 
 const MILLIMETRE: f32 = 1e-3;
@@ -125,7 +132,23 @@ fn metres(corners: [[f32; 3]; 4]) -> [Vec3; 4] {
     corners.map(|c| Vec3::from_array(c) * MILLIMETRE)
 }
 
-/// The box of [`CORNELL_BOX`]'s parameters.
+fn build_with_front(values: &Values) -> Result<Scene> {
+    let mut scene = build(values)?;
+    if values.word("front")? == "glass" {
+        let glass = scene.add_material(Material::glass("glass", 1.5));
+        // Towards the eye: what is behind it is within the glass.
+        let [right, left, ..] = metres(FLOOR);
+        let [above_right, .., above_left] = metres(CEILING);
+        scene.place(
+            MeshBuilder::new("front", glass)
+                .quad([left, above_left, above_right, right])
+                .build(),
+        );
+    }
+    Ok(scene)
+}
+
+/// The box of [`CORNELL_BOX`]'s parameters but what is before it.
 pub(super) fn build(values: &Values) -> Result<Scene> {
     let mut scene = Scene::default();
     let white = scene.add_material(Material::lambert("white", WHITE));
@@ -279,6 +302,19 @@ mod tests {
         }
         // The four edges of the missing front wall; everything else meets its neighbour with consistent winding.
         assert_eq!(open_edges(&all.build()), 4);
+    }
+
+    #[test]
+    fn a_front_of_glass_is_one_more_quad_towards_the_eye() {
+        let scene = generate("builtin:cornell-box?front=glass").expect("scene");
+        let open = generate("builtin:cornell-box").expect("scene");
+        assert_eq!(scene.meshes.len(), open.meshes.len() + 1);
+        let front = scene.meshes.iter().find(|mesh| mesh.name == "front").expect("front");
+        assert_eq!(front.triangles.len(), 2);
+        for triangle in &front.triangles {
+            let [a, b, c] = triangle.map(|i| front.positions[i as usize]);
+            assert!((b - a).cross(c - a).z < 0.0 && [a, b, c].iter().all(|corner| corner.z == 0.0));
+        }
     }
 
     #[test]

@@ -111,7 +111,7 @@ const ROWS: &[Row] = &[
         id: "CL-IMPOSTOR",
         name: "technique `impostor`: direct light, and reflections of smooth surfaces by a distance impostor",
         role: Role::Technique,
-        limits: "Few layers of surfaces, by default one, so that what the map's place does not see is not there; reflecting bodies do not show in reflections, and what refracts has one interface and absorbs nothing of the light on its way to what lies within.",
+        limits: "The map is an octahedron of few layers of surfaces, by default one, so that what its place does not see is not there; reflecting bodies do not show in reflections, and what refracts has one interface and absorbs nothing of the light on its way to what lies within.",
         sources: &[
             sources::SZIRMAY_KALOS_2005.whole(),
             sources::UMENHOFFER_2007.at("chapter 17"),

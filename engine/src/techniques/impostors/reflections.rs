@@ -15,6 +15,7 @@ use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
+use crate::maps::impostor::ImpostorTexels;
 use crate::raster::ObjectTriangles;
 use crate::scene::Camera;
 use crate::settings::TypedSettings;
@@ -179,8 +180,8 @@ impl ImpostorReflections {
             by,
             bounces: [0, settings.bounces],
             with_distances: settings.search().is_some(),
-            // A texel's distance is that to the plane through its point.
-            with_normals: settings.search().is_some(),
+            // A texel's distance is that to the plane through its point, unless it is to be the same for all of it.
+            with_normals: settings.search().is_some() && settings.texels != ImpostorTexels::Distances,
             layers: settings.layers,
             left_out,
             shadow_side: settings.shadow_side,
@@ -296,6 +297,11 @@ impl ImpostorReflections {
             all.push(Skipped {
                 what: "distances",
                 why: "the method looks none up",
+            });
+        } else if self.settings.texels == ImpostorTexels::Distances {
+            all.push(Skipped {
+                what: "normals",
+                why: "texels hold distances alone",
             });
         }
         if self.captured_by == Some(CaptureBy::Rays) {

@@ -99,9 +99,9 @@ crate::settings! {
         ///
         /// More than one take a method that searches distances, best a march, and a capture by rays.
         pub layers: u32 = 1, in 1..=LAYERS_MAX, unit "layers";
-        /// What a texel holds beside radiance: its plane, in sixteen bytes, or distance and normal in eight, of which each look-up makes the plane.
+        /// What a texel holds beside radiance: its plane, in sixteen bytes, distance and normal in eight, of which each look-up makes the plane, or the distance alone in four.
         ///
-        /// Pictures are the same but for rounding; a look-up of a plane does less than half.
+        /// Pictures by planes and by normals are the same but for rounding; a look-up of a plane does less than half. With distances alone no normals are captured, and searches are off by up to half a texel.
         pub texels: ImpostorTexels = ImpostorTexels::Planes;
         /// Along a side of the map's octahedron: how sharp reflections are, and how near searches end.
         pub side: u32 = 256, in 16..=2048, unit "texels";

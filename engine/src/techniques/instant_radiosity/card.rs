@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 
 use super::renderer::VirtualLights;
 use super::settings::VirtualLightSettings;
-use super::{cut_tree, gather, selection};
+use super::{cut_tree, gather, medium_gather, selection};
 use crate::Result;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
-use crate::gpu::shaders::techniques::instant_radiosity::{vpl_append, vpl_gather};
+use crate::gpu::shaders::techniques::instant_radiosity::{
+    vpl_append, vpl_gather, vpl_medium, vpl_medium_append, vpl_medium_gather,
+};
 use crate::gpu::shaders::techniques::path::path_shade;
-use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
+use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_glow, photon_scatter};
 use crate::scene::SceneProfile;
 use crate::settings::{Settings, SettingsDecl};
 use crate::techniques::path::card as path;
@@ -21,7 +23,7 @@ use crate::transport::{PathSet, SURFACE_FEATURES};
 pub(in crate::techniques) const CARD: Card = Card {
     id: "vpl",
     summary: "instant radiosity: indirect light as that of virtual point lights, new ones for each pass, with shadow rays and a compensated bound",
-    rows: &[ROWS, gather::ROWS, cut_tree::ROWS, selection::ROWS],
+    rows: &[ROWS, gather::ROWS, medium_gather::ROWS, cut_tree::ROWS, selection::ROWS],
     bias: BIAS,
     needs: &[],
     kernels: &[&path::KERNELS, &KERNELS],
@@ -59,10 +61,15 @@ fn law(settings: &Settings) -> Result<Law> {
 
 /// Why a scene cannot be modelled.
 pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
+    let from_infinity = profile.has_environment() || profile.lights.directional > 0;
     reasons(&[
         (
-            profile.media.any(),
-            "the scene has participating media, and virtual lights lie on surfaces only",
+            profile.media.emits_endlessly,
+            "the scene has an endless participating medium that emits everywhere, more than walks carry",
+        ),
+        (
+            profile.media.surrounding && from_infinity,
+            "the scene has endless participating media and light from infinity, which no walk brings through them",
         ),
         (
             profile.has_unlit,
@@ -72,11 +79,15 @@ pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
 }
 
 /// What a picture may take with default settings, of whatever scene, beside what eye paths do.
-const KERNELS: [&ShaderInfo; 4] = [
+const KERNELS: [&ShaderInfo; 8] = [
     &photon_emit::INFO,
+    &photon_glow::INFO,
     &photon_scatter::INFO,
     &vpl_append::INFO,
     &vpl_gather::INFO,
+    &vpl_medium::INFO,
+    &vpl_medium_append::INFO,
+    &vpl_medium_gather::INFO,
 ];
 
 impl Technique for VirtualLights {
@@ -104,6 +115,7 @@ impl Technique for VirtualLights {
             ("walks", c.walks.emitted),
             ("walks_escaped", c.walks.escaped),
             ("walks_absorbed", c.walks.absorbed),
+            ("walks_collided", c.walks.collisions),
             ("virtual_lights", c.lights),
             ("gathers", c.gather.gathers),
             ("connections", c.gather.connections),
@@ -147,7 +159,7 @@ const ROWS: &[Row] = &[
         id: "SVO-G0",
         name: "technique `vpl`: direct light and mirrors by rays, all else from virtual point lights, new for each pass (instant radiosity)",
         role: Role::Technique,
-        limits: "Refuses scenes with media or unlit surfaces; light off a mirror or through smooth glass onto the first rough surface is no part of the picture; biased where a bound is not compensated, by a limited number of steps, or by lights of little potential that are left out; walks that go on over surfaces with interpolated or mapped normals scatter otherwise than eye paths, which bend these normals towards the eye; virtual lights within rounding of an edge shine past it; all pixels of a pass share its noise; of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
+        limits: "Refuses scenes with unlit surfaces, and with endless media that emit or have light from infinity; light off a mirror or through smooth glass onto the first rough surface is no part of the picture, and light that a mirror sends into a medium is found by eye paths alone; biased where a bound is not compensated, by a limited number of steps, or by lights of little potential that are left out; walks that go on over surfaces with interpolated or mapped normals scatter otherwise than eye paths, which bend these normals towards the eye; virtual lights within rounding of an edge shine past it; all pixels of a pass share its noise; of emitters that light sampling leaves out, slivers and those behind others in one place, only what comes directly is there.",
         sources: &[
             sources::KELLER_1997.whole(),
             sources::KOLLIG_KELLER_2006.whole(),
@@ -171,6 +183,7 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/edge_cases.rs::waves_shrink_until_gathering_fits_beside_them",
             "tests/tests/instant_radiosity/edge_cases.rs::scenes_without_lights_or_reflection_have_no_virtual_light",
             "tests/tests/instant_radiosity/edge_cases.rs::what_cannot_be_modelled_is_refused_by_name",
+            "tests/tests/instant_radiosity/media.rs::lights_at_collisions_agree_with_the_path_tracer",
         ],
         api: &["clerestory::techniques::instant_radiosity::VirtualLights"],
         settings: &[

@@ -212,7 +212,7 @@ impl CutTree {
 pub(super) const ROWS: &[Row] = &[
     Row {
         id: "CL-VPL-CUTS",
-        name: "stochastic lightcuts over virtual lights: one light below each node of a cut through a tree of clusters of lights that the device makes, setting `selection` cuts of `vpl`",
+        name: "stochastic lightcuts over virtual lights: one light below each node of a cut through a tree of clusters of lights (MET-P9's) that the device makes, setting `selection` cuts of `vpl`",
         role: Role::PartOf("SVO-G0"),
         limits: "Cuts know nothing of shadows, of glossy lobes at either end, or of how often light was scattered; 2²⁰ virtual lights a pass where buffers have 128 MiB.",
         sources: &[

@@ -3,9 +3,9 @@
 //! Places × lights are never stored: an invocation takes the lights of its place one after the other, as many a dispatch as the loops of the device allow, and
 //! goes on in the next one. So memory is that of the places, whatever the number of lights.
 
-use std::cell::Cell;
-
+use super::medium_gather::{MediumGather, Over};
 use super::settings::{Selection, VirtualLightSettings};
+use super::stopped_pace::StoppedPace;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
@@ -16,12 +16,12 @@ use crate::gpu::shaders::sets::{VirtualLightSet, WaveSet};
 use crate::gpu::shaders::techniques::instant_radiosity::vpl_gather;
 use crate::gpu::shaders::types::GatherState;
 use crate::gpu::{
-    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Pace, Pass, PipelineInfo, Recorder,
+    Access, Buffer, BufferDesc, Category, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo, Recorder,
     SOFTWARE_LOOP_CAP, TexelView, wide_counter,
 };
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, PathSet, surface_spec};
-use crate::walk::{ArrivalStage, Places, RAY_QUOTA, StoppedPlaces, stage_barrier};
+use crate::walk::{ArrivalStage, Places, RAY_QUOTA, StoppedPlaces, WalkKey, stage_barrier};
 use crate::{Error, Result};
 
 /// Lights that a place takes in one dispatch: enough to be worth looking the surface up again.
@@ -33,9 +33,7 @@ const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
 /// Loop iterations that finding the potential of all lights takes at most, in the dispatch that a place begins in.
 const POTENTIAL_ITERATIONS: u32 = 1 << 15;
 /// Connections of a submission that goes on with places that have stopped, on software devices: a second or less on two cores.
-const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
-/// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections.
-const PLACES_AT_ONCE: u32 = 1 << 12;
+pub(super) const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
 /// The same of techniques without a pace, on devices that a driver watches.
 const DEVICE_CONNECTIONS: u32 = 1 << 22;
 
@@ -64,42 +62,9 @@ pub struct VirtualLightCounts {
     pub nodes: u64,
 }
 
-/// How many places a submission goes on with that have stopped: as many as a driver that watches has time for, by what the last one took.
-struct StoppedPace {
-    /// In units of [`PLACES_AT_ONCE`].
-    pace: Pace,
-    /// Units on software devices.
-    unwatched: u32,
-    /// Places of the submission that was recorded last, until its time is known.
-    recorded: Cell<u32>,
-}
-
-impl StoppedPace {
-    fn new(kind: DeviceKind, lights_at_once: u32) -> Self {
-        Self {
-            pace: Pace::new(kind, u32::MAX / PLACES_AT_ONCE),
-            unwatched: SOFTWARE_CONNECTIONS / (lights_at_once * PLACES_AT_ONCE),
-            recorded: Cell::new(0),
-        }
-    }
-
-    /// Of the next submission, in whole workgroups.
-    fn places(&self) -> u32 {
-        self.pace.units(PLACES_AT_ONCE, self.unwatched) * PLACES_AT_ONCE
-    }
-
-    /// A submission took so long, whether it went on with such places or not.
-    fn submitted(&mut self, seconds: f64) {
-        let places = self.recorded.take();
-        if places > 0 {
-            self.pace.submitted(seconds, u64::from(places));
-        }
-    }
-}
-
 /// The kernel of connections, and what places keep between its dispatches.
 pub(super) struct Gather {
-    pipeline: ComputePipeline<vpl_gather::Kernel>,
+    kernel: GatherKernel,
     states: Buffer,
     counters: Buffer,
     counters_readback: Buffer,
@@ -109,6 +74,12 @@ pub(super) struct Gather {
     edge_bound: EdgeBound,
     selected: Selected,
     pace: StoppedPace,
+}
+
+/// By whether the scene has media.
+enum GatherKernel {
+    Surfaces(ComputePipeline<vpl_gather::Kernel>),
+    Media(MediumGather),
 }
 
 /// Which lights places take.
@@ -144,14 +115,17 @@ pub(super) struct GatherStage<'a> {
 type Counters = vpl_gather::VirtualLightCounters;
 
 impl Gather {
-    /// What a place keeps between dispatches.
-    pub fn state_bytes(settings: &VirtualLightSettings) -> u64 {
+    /// What a place keeps between dispatches, in a scene with or without media.
+    pub fn state_bytes(settings: &VirtualLightSettings, has_media: bool) -> u64 {
         const SELECTED_BYTES: u64 = 2 * size_of::<f32>() as u64;
+        if has_media {
+            return MediumGather::STATE_BYTES;
+        }
         let selected = settings.selection == Selection::Potential;
         size_of::<GatherState>() as u64 + if selected { SELECTED_BYTES } else { 0 }
     }
 
-    /// For eye paths of the set `eye`; `states` has [`state_bytes`](Self::state_bytes) for each that may be under way.
+    /// For eye paths of the set `eye`; `states` has [`state_bytes`](Self::state_bytes) for each that may be under way. In scenes with media `settings` take all lights.
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
@@ -160,33 +134,16 @@ impl Gather {
         edge_bound: EdgeBound,
         states: Buffer,
     ) -> Result<Self> {
-        let profile = scene.profile();
-        let (once, each) = match settings.selection {
-            Selection::All => (0, 0),
-            Selection::Potential => (POTENTIAL_ITERATIONS + 2 * POTENTIAL_BINS, 0),
-            Selection::Cuts => {
-                let each = 1 + LIGHT_TREE_DEPTH_MAX + searches(scene);
-                let once = (LIGHT_CUT_MAX + LIGHT_TREE_DEPTH_MAX) * (LIGHT_CUT_MAX + 1);
-                (once, settings.candidates * each)
-            }
+        let has_media = scene.profile().media.any();
+        let (kernel, lights_at_once) = if has_media {
+            let (kernel, lights_at_once) = MediumGather::new(gpu, scene, settings, eye, edge_bound)?;
+            (GatherKernel::Media(kernel), lights_at_once)
+        } else {
+            let (kernel, lights_at_once) = on_surfaces(gpu, scene, settings, eye, edge_bound)?;
+            (GatherKernel::Surfaces(kernel), lights_at_once)
         };
-        let (lights_at_once, index_quota) = lights_beside(gpu, scene, settings.lights_at_once, [once, each])?;
-        let traversal = scene.index_traversal();
-        let spec = surface_spec!(vpl_gather, scene, {
-            has_multiple_scattering: scene.bsdf_features().multiple_scattering,
-            separable_masking: false,
-            has_alpha: profile.has_alpha(),
-            has_path_automaton: eye.has_automaton(),
-            edge_bound: edge_bound.kind(),
-            counts_bounces: settings.least_bounces > 2 || settings.most().is_some(),
-            selection: settings.selection as u32,
-            lights_at_once,
-            index_quota,
-            index_kind: traversal.kind(),
-            ..Default::default()
-        });
         let bytes = size_of::<Counters>() as u64;
-        let places = states.bytes() / Self::state_bytes(settings);
+        let places = states.bytes() / Self::state_bytes(settings, has_media);
         let selected = Selected {
             selection: settings.selection,
             share: settings.potential_share,
@@ -197,7 +154,7 @@ impl Gather {
             most: POTENTIAL_ITERATIONS / (1 + searches(scene)),
         };
         Ok(Self {
-            pipeline: traversal.pipeline(gpu, &spec)?,
+            kernel,
             states,
             counters: gpu.buffer(&BufferDesc::storage("virtual light counters", bytes, Category::Work))?,
             counters_readback: gpu.buffer(&BufferDesc::readback("virtual light counters", bytes))?,
@@ -210,7 +167,10 @@ impl Gather {
     }
 
     pub fn pipeline(&self) -> PipelineInfo {
-        self.pipeline.info()
+        match &self.kernel {
+            GatherKernel::Surfaces(pipeline) => pipeline.info(),
+            GatherKernel::Media(kernel) => kernel.pipeline(),
+        }
     }
 
     /// Counts of the last wave.
@@ -253,6 +213,42 @@ impl Gather {
     }
 }
 
+/// The kernel for a scene without media, and how many lights a place takes in a dispatch.
+fn on_surfaces(
+    gpu: &Gpu,
+    scene: &GpuScene,
+    settings: &VirtualLightSettings,
+    eye: &PathSet,
+    edge_bound: EdgeBound,
+) -> Result<(ComputePipeline<vpl_gather::Kernel>, u32)> {
+    let profile = scene.profile();
+    let (once, each) = match settings.selection {
+        Selection::All => (0, 0),
+        Selection::Potential => (POTENTIAL_ITERATIONS + 2 * POTENTIAL_BINS, 0),
+        Selection::Cuts => {
+            let each = 1 + LIGHT_TREE_DEPTH_MAX + searches(scene);
+            let once = (LIGHT_CUT_MAX + LIGHT_TREE_DEPTH_MAX) * (LIGHT_CUT_MAX + 1);
+            (once, settings.candidates * each)
+        }
+    };
+    let (lights_at_once, index_quota) = lights_beside(gpu, scene, settings.lights_at_once, [once, each])?;
+    let traversal = scene.index_traversal();
+    let spec = surface_spec!(vpl_gather, scene, {
+        has_multiple_scattering: scene.bsdf_features().multiple_scattering,
+        separable_masking: false,
+        has_alpha: profile.has_alpha(),
+        has_path_automaton: eye.has_automaton(),
+        edge_bound: edge_bound.kind(),
+        counts_bounces: settings.least_bounces > 2 || settings.most().is_some(),
+        selection: settings.selection as u32,
+        lights_at_once,
+        index_quota,
+        index_kind: traversal.kind(),
+        ..Default::default()
+    });
+    Ok((traversal.pipeline(gpu, &spec)?, lights_at_once))
+}
+
 /// Loop iterations of a connection beside those of its ray.
 fn searches(scene: &GpuScene) -> u32 {
     if scene.profile().keeps_instances { SEARCHES } else { 0 }
@@ -264,7 +260,7 @@ pub(super) fn lights_at_once(gpu: &Gpu, scene: &GpuScene, wanted: u32) -> Result
 }
 
 /// As [`lights_at_once`], beside so many iterations in all and for each light.
-fn lights_beside(gpu: &Gpu, scene: &GpuScene, wanted: u32, [once, more]: [u32; 2]) -> Result<(u32, u32)> {
+pub(super) fn lights_beside(gpu: &Gpu, scene: &GpuScene, wanted: u32, [once, more]: [u32; 2]) -> Result<(u32, u32)> {
     let filters = scene.profile().has_alpha();
     let mut lights = if wanted == 0 {
         LIGHTS_A_DISPATCH
@@ -319,7 +315,25 @@ impl GatherStage<'_> {
         }
     }
 
-    fn set(&self) -> VirtualLightSet<'_> {
+    /// The kernel over some places, whose walks' random numbers are keyed so.
+    fn dispatch(&self, pass: &mut Pass<'_>, wave: &WaveSet<'_>, key: WalkKey, over: Over<'_>) -> Result<()> {
+        let mut push = self.push();
+        let pipeline = match &self.gather.kernel {
+            GatherKernel::Surfaces(pipeline) => pipeline,
+            GatherKernel::Media(kernel) => return kernel.record(pass, self, wave, (push, key), over),
+        };
+        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
+        let sets: [&dyn BindingSet<'_>; 4] = [wave, &index, &scene, &own];
+        match over {
+            Over::All(places) => pass.dispatch_indirect(pipeline, &sets, &push, places),
+            Over::Stopped { first, count } => {
+                (push.first_place, push.goes_on) = (first, 1);
+                pass.dispatch(pipeline, &sets, &push, [pipeline.groups_for(count), 1, 1])
+            }
+        }
+    }
+
+    pub(super) fn set(&self) -> VirtualLightSet<'_> {
         VirtualLightSet {
             virtual_light_texels: self.lights,
             virtual_light_states: self.gather.states.view(),
@@ -333,11 +347,8 @@ impl GatherStage<'_> {
 
 impl ArrivalStage for GatherStage<'_> {
     fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
-        let pipeline = &self.gather.pipeline;
-        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
         recorder.pass("vpl: gather", |pass| {
-            let sets: [&dyn BindingSet<'_>; 4] = [wave, &index, &scene, &own];
-            pass.dispatch_indirect(pipeline, &sets, &self.push(), places.items)?;
+            self.dispatch(pass, wave, places.key, Over::All(places.items))?;
             stage_barrier(pass);
             Ok(())
         })
@@ -378,21 +389,15 @@ impl ArrivalStage for GatherStage<'_> {
             }
         }
         let places = gather.pace.places().min(all - first);
-        gather.pace.recorded.set(places);
-        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
-        let push = vpl_gather::Push {
-            first_place: first,
-            goes_on: 1,
-            ..self.push()
-        };
+        gather.pace.record(places);
         recorder.pass("vpl: gather on", |pass| {
             if first == 0 {
                 let offset = std::mem::offset_of!(Counters, remaining) as u64;
                 pass.fill(gather.counters.slice(offset, size_of::<u32>() as u64), 0)?;
                 pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             }
-            let groups = [gather.pipeline.groups_for(places), 1, 1];
-            pass.dispatch(&gather.pipeline, &[wave, &index, &scene, &own], &push, groups)?;
+            let over = Over::Stopped { first, count: places };
+            self.dispatch(pass, wave, stopped.key, over)?;
             if first + places == all {
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
                 self.read_back(pass)?;
@@ -467,27 +472,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_that_go_on_are_as_many_as_a_driver_has_time_for() {
-        let mut pace = StoppedPace::new(DeviceKind::Discrete, 64);
-        assert_eq!(pace.places(), PLACES_AT_ONCE);
-        // A submission of other stages says nothing of the pace of this one.
-        pace.submitted(1.0);
-        assert_eq!(pace.places(), PLACES_AT_ONCE);
-        let mut after = |places, seconds| {
-            pace.recorded.set(places);
-            pace.submitted(seconds);
-            pace.places()
-        };
-        // A quarter of a second each.
-        assert_eq!(after(PLACES_AT_ONCE, 1e-3), 250 * PLACES_AT_ONCE);
-        assert_eq!(after(250 * PLACES_AT_ONCE, 1.0), 62 * PLACES_AT_ONCE);
-        // Seconds for the least there is: no less is to be had.
-        assert_eq!(after(PLACES_AT_ONCE, 3.0), PLACES_AT_ONCE);
-        let software = |lights| StoppedPace::new(DeviceKind::Cpu, lights).places();
-        assert_eq!([64, 1].map(software), [1 << 13, 1 << 19]);
-    }
-
-    #[test]
     fn rough_vertices_gather_where_a_path_may_be_scattered_once_more() {
         let states = |text: &str| {
             let set: PathSet = text.parse().unwrap();
@@ -500,5 +484,7 @@ mod tests {
         // Every vertex, as the last one before a mirror, the next, and all after it.
         assert_eq!(states("!L.*S[DG]S*E"), (1, 3));
         assert_eq!(states("L[DG]{0,3}S*E"), (1, 3));
+        // In media the first vertex, and the next behind one in a medium and a mirror.
+        assert_eq!(states("L[DG]?S*E|LS*([DGV]S+)*VS*E"), (1, 2));
     }
 }

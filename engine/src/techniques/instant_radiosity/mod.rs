@@ -1,4 +1,4 @@
-//! Instant radiosity: indirect light as that of virtual point lights, which walks from the lights leave on surfaces.
+//! Instant radiosity: indirect light as that of virtual point lights, which walks from the lights leave on surfaces and in media.
 
 mod append;
 mod card;
@@ -6,10 +6,13 @@ mod cut_tree;
 mod gather;
 pub mod incremental;
 pub mod many_light;
+mod medium_gather;
+mod medium_lights;
 mod renderer;
 pub mod resampling;
 pub mod selection;
 mod settings;
+mod stopped_pace;
 
 pub(super) use card::CARD;
 pub use gather::VirtualLightCounts;

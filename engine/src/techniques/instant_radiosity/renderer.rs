@@ -8,6 +8,10 @@
 //! beyond, eye paths go on with the weight of what it left out, and gather again where they arrive. Light off a mirror or through smooth glass onto the first
 //! rough surface is no part of the picture: no virtual light lies on either.
 //!
+//! In media collisions of walks are virtual lights as well, and eye paths gather at a collision of their ray or at the surface, as free flights choose. A
+//! collision scatters by the medium's phase function, and the geometry term has no cosine there. What a mirror sends into a medium is the eye paths', which go on from their
+//! collisions.
+//!
 //! Guarantees: deterministic in (seed, pass, walk) and (seed, pixel, sample), on any number of threads; unbiased on its path set without a bound and with a compensated
 //! one, since passes have virtual lights of their own, each an unbiased estimate for all pixels at once; but for walks that go on over surfaces whose shading normals
 //! lean, as those bend towards the light on a walk and towards the eye on the path tracer's paths. Pixels share the noise of a pass.
@@ -19,6 +23,7 @@ use super::append::LightAppend;
 use super::card::refusals;
 use super::cut_tree::CutTree;
 use super::gather::{Gather, GatherStage, VirtualLightCounts};
+use super::medium_lights::MediumLights;
 use super::settings::{Selection, VirtualLightSettings};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
@@ -28,7 +33,7 @@ use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
 use crate::techniques::path::PathCounters;
-use crate::techniques::photon_mapping::{PhotonCounts, PhotonPlan, PhotonTracer, Stored, Tracing};
+use crate::techniques::photon_mapping::{Append, PhotonCounts, PhotonPlan, PhotonTracer, Stored, Tracing};
 use crate::techniques::{PathTracer, PathTracerSettings};
 use crate::transport::random::pcg4d;
 use crate::transport::{GpuScene, PathSet};
@@ -63,9 +68,9 @@ pub struct PassCounts {
 pub struct VirtualLight {
     /// Place, m.
     pub position: Vec3,
-    /// Geometric normal, to the side that the power came from.
+    /// Geometric normal, to the side that the power came from; zero for a collision with a medium.
     pub normal: Vec3,
-    /// Power that arrives there, W.
+    /// Power that arrives there, W; at a collision that which is scattered.
     pub power: Vec3,
     /// How often it had been scattered before.
     pub bounce: u32,
@@ -98,8 +103,9 @@ impl VirtualLights {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a setting or size out of range, [`Error::Unsupported`] for a scene with participating media or unlit surfaces,
-    /// [`Error::LimitExceeded`] for a ray index whose leaves are too long for a software device, [`Error::OutOfMemory`].
+    /// [`Error::Setting`] for a setting or size out of range, or one that is not for a scene with participating media, [`Error::Unsupported`] for a scene with unlit
+    /// surfaces, an endless medium that emits everywhere, or one with light from infinity, [`Error::LimitExceeded`] for a ray index whose leaves are too long for a
+    /// software device and for media that emit among bodies of more than 8,192 triangles, [`Error::OutOfMemory`].
     pub fn new(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -115,8 +121,13 @@ impl VirtualLights {
                 reasons,
             });
         }
-        let (path_set, eye_paths) = (settings.path_set()?, settings.eye_paths()?);
-        let has_lights = scene.has_lights() && settings.most().is_none_or(|most| most >= CONNECTED);
+        let has_media = scene.profile().media.any();
+        if has_media {
+            settings.check_in_media()?;
+        }
+        let (path_set, eye_paths) = (settings.path_set()?, settings.eye_paths(has_media)?);
+        let sends_walks = scene.has_lights() || scene.glow().is_some();
+        let has_lights = sends_walks && settings.most().is_none_or(|most| most >= CONNECTED);
         let bound = if has_lights {
             settings.edge_bound(scene.surface_area())
         } else {
@@ -139,16 +150,13 @@ impl VirtualLights {
                     last_bounce: settings.most().map_or(u32::MAX, |most| most - CONNECTED),
                 },
             };
-            PhotonTracer::new(
-                gpu,
-                Arc::clone(&scene),
-                plan,
-                Box::new(LightAppend::new(
-                    gpu,
-                    &scene,
-                    "follow fewer walks per pass: setting `walks`",
-                )?),
-            )
+            let fewer = "follow fewer walks per pass: setting `walks`";
+            let append: Box<dyn Append> = if has_media {
+                Box::new(MediumLights::new(gpu, &scene, settings.sampler, fewer)?)
+            } else {
+                Box::new(LightAppend::new(gpu, &scene, fewer)?)
+            };
+            PhotonTracer::new(gpu, Arc::clone(&scene), plan, append)
         });
         let tracer = tracer.transpose()?;
         let eye_settings = PathTracerSettings {
@@ -162,7 +170,11 @@ impl VirtualLights {
             ..PathTracerSettings::default()
         };
         // Takes as much memory as is left, if it must, with what gathering keeps.
-        let kept = if has_lights { Gather::state_bytes(&settings) } else { 0 };
+        let kept = if has_lights {
+            Gather::state_bytes(&settings, has_media)
+        } else {
+            0
+        };
         let eye = PathTracer::beyond(gpu, Arc::clone(&scene), camera, size, eye_settings, bound, kept)?;
         let lights = match tracer {
             Some(tracer) => Some(Lights {

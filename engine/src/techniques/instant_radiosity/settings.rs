@@ -10,6 +10,9 @@ use crate::{Error, Result};
 
 /// What eye paths have where virtual lights bring all that is reflected more than once.
 const DIRECT: &str = "L[DG]?S*E";
+/// The same where there are media, in which no virtual light has what a mirror sends: paths go on from there through mirrors alone, up to the next scattering, where virtual
+/// lights bring what is scattered once more before.
+const DIRECT_IN_MEDIA: &str = "L[DG]?S*E|LS*([DGV]S+)*VS*E";
 /// A path set's range has twelve bits for each of its ends.
 const BOUNCES_MAX: u32 = PATH_SET_UNBOUNDED - 1;
 
@@ -88,10 +91,12 @@ crate::settings! {
         /// Source: T. Kollig and A. Keller, "Illumination in the Presence of Weak Singularities", MCQMC 2004, 2006.
         pub compensation: Compensation = Compensation::Rays;
         /// Scatterings of eye paths that go on for the compensation, at most, which leaves a part of the light out; 0 goes on until the weight is zero.
+        ///
+        /// 0 alone in scenes with participating media.
         pub compensation_steps: u32 = 0, in 0..=8, unit "scatterings";
         /// Which virtual lights send a place shadow rays: all, the strongest, or by chance one below each node of a cut through a tree of them.
         ///
-        /// All and cuts have the same expected picture; the strongest alone bias it, as `rescales` says.
+        /// All and cuts have the same expected picture; the strongest alone bias it, as `rescales` says. Scenes with participating media have all alone.
         pub selection: Selection = Selection::All;
         /// Of `selection` potential: the share of what all lights would bring if nothing stood between that those taken carry.
         pub potential_share: f32 = 0.9, in 0.0..=1.0, unit "of the potential";
@@ -112,7 +117,7 @@ crate::settings! {
         /// Ends walks by one number each, evenly spread over a pass, so that as many survive each scattering as albedos say, instead of by a
         /// roulette at each; changes the noise only.
         ///
-        /// Source: A. Keller, "Instant Radiosity", SIGGRAPH 1997, whose walks are fractional powers of the albedo times their number.
+        /// Not in scenes with participating media. Source: A. Keller, "Instant Radiosity", SIGGRAPH 1997, whose walks are fractional powers of the albedo times their number.
         pub fractional: bool = false;
         /// Eye paths per pixel that the same virtual lights light.
         ///
@@ -194,12 +199,31 @@ impl VirtualLightSettings {
         PathSet::LIT_OFF_NO_MIRROR.intersection(&range)
     }
 
-    /// What eye paths have by themselves, and beyond the bound.
+    /// Refuses what is for scenes without participating media.
+    ///
+    /// # Errors
+    /// [`Error::Setting`].
+    pub(super) fn check_in_media(&self) -> Result<()> {
+        let refuse = |name: &str, value: &str, instead: &str| {
+            let cause = format!("is for scenes without participating media; take {instead}");
+            Err(Error::setting(name, value, cause))
+        };
+        match (self.selection, self.fractional, self.compensation_steps) {
+            (Selection::Potential, ..) => refuse("selection", "potential", "\"all\""),
+            (Selection::Cuts, ..) => refuse("selection", "cuts", "\"all\""),
+            (_, true, _) => refuse("fractional", "true", "false"),
+            (_, _, 0) => Ok(()),
+            (_, _, steps) => refuse("compensation_steps", &steps.to_string(), "0"),
+        }
+    }
+
+    /// What eye paths have by themselves, and beyond the bound, in a scene with or without media.
     ///
     /// # Errors
     /// As [`path_set`](Self::path_set).
-    pub(super) fn eye_paths(&self) -> Result<PathSet> {
+    pub(super) fn eye_paths(&self, has_media: bool) -> Result<PathSet> {
         let paths: PathSet = match (self.compensates(), self.compensation_steps) {
+            (false, _) if has_media => DIRECT_IN_MEDIA.parse()?,
             (false, _) => DIRECT.parse()?,
             (true, 0) => PathSet::LIT_OFF_NO_MIRROR,
             (true, steps) => format!("L[DG]{{0,{}}}S*E", steps + 1).parse()?,
@@ -249,13 +273,15 @@ mod tests {
             (settings(Bound::Distance, Compensation::Rays, 0), true, true),
             (settings(Bound::Geometry, Compensation::Rays, 2), false, false),
         ] {
-            let (eye, picture) = (settings.eye_paths().unwrap(), settings.path_set().unwrap());
+            let (eye, picture) = (settings.eye_paths(false).unwrap(), settings.path_set().unwrap());
             assert!(eye.is_subset_of(&picture) && direct.is_subset_of(&eye), "{eye}");
             assert_eq!(picture.is_subset_of(&eye), all, "{eye}");
             assert_eq!(settings.leaves_out().is_none(), whole, "{settings:?}");
         }
         // Two steps scatter thrice in all.
-        let eye = settings(Bound::Geometry, Compensation::Rays, 2).eye_paths().unwrap();
+        let eye = settings(Bound::Geometry, Compensation::Rays, 2)
+            .eye_paths(false)
+            .unwrap();
         let contains = |text: &str| text.parse::<PathSet>().unwrap().is_subset_of(&eye);
         assert!(contains("LDGDSE") && !contains("LDDDDE") && !contains("LSDE"));
         let ranged = VirtualLightSettings {
@@ -264,5 +290,58 @@ mod tests {
             ..VirtualLightSettings::default()
         };
         assert!(ranged.check().unwrap_err().to_string().contains("most_bounces"));
+    }
+
+    #[test]
+    fn eye_paths_in_media_also_have_what_mirrors_send_there() {
+        let settings = VirtualLightSettings {
+            bound: Bound::None,
+            ..VirtualLightSettings::default()
+        };
+        let (eye, picture) = (settings.eye_paths(true).unwrap(), settings.path_set().unwrap());
+        assert!(eye.is_subset_of(&picture), "{eye}");
+        let contains = |text: &str| text.parse::<PathSet>().unwrap().is_subset_of(&eye);
+        for own in [
+            "LE",
+            "LSE",
+            "LDE",
+            "LGSE",
+            "LVE",
+            "LVSE",
+            "LSVE",
+            "LDSVE",
+            "LVSVE",
+            "LDSDSSVSE",
+        ] {
+            assert!(contains(own), "{own}");
+        }
+        // Edges between two scatterings are the virtual lights', and light off a mirror to the first rough surface nobody's.
+        for others in ["LDDE", "LVDE", "LDVE", "LVVE", "LVDSVE", "LSDE", "LSDSE", "LSDDE"] {
+            assert!(!contains(others), "{others}");
+        }
+        // Those without media have no other paths than before.
+        let of_surfaces: PathSet = "L[DG]?S*E".parse().unwrap();
+        assert_eq!(settings.eye_paths(false).unwrap(), of_surfaces);
+        assert!(settings.check_in_media().is_ok());
+        let refused = [
+            (
+                "selection",
+                VirtualLightSettings {
+                    selection: Selection::Cuts,
+                    ..settings.clone()
+                },
+            ),
+            (
+                "fractional",
+                VirtualLightSettings {
+                    fractional: true,
+                    ..settings
+                },
+            ),
+        ];
+        for (name, settings) in refused {
+            let error = settings.check_in_media().unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains("participating media"), "{error}");
+        }
     }
 }

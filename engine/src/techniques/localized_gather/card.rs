@@ -84,7 +84,7 @@ const ROWS: &[Row] = &[Row {
     id: "CL-LOCALIZED-GATHER",
     name: "technique `localized-gather`: direct light, and light of one scattering more by a localised gather",
     role: Role::Technique,
-    limits: "Nothing hides a light from the point that gathers; one layer of surfaces as the map's place sees them.",
+    limits: "Nothing hides a light from the point that gathers; one layer of surfaces as the map's place sees them, by an octahedron.",
     sources: &[sources::SZIRMAY_KALOS_LAZANYI_2006.whole()],
     shaders: &[
         "shaders/techniques/localized_gather/",

@@ -32,14 +32,17 @@ pub(in crate::techniques) const CARD: Card = Card {
         Variant {
             name: "independent samples",
             settings: || serde_json::json!({ "sampler": "pcg" }),
+            ..Variant::DEFAULTS
         },
         Variant {
             name: "late roulette",
             settings: || serde_json::json!({ "roulette_start": 12 }),
+            ..Variant::DEFAULTS
         },
         Variant {
             name: "early roulette",
             settings: || serde_json::json!({ "roulette_start": 1 }),
+            ..Variant::DEFAULTS
         },
     ],
     foresight: Foresight {

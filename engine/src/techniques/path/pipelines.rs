@@ -116,6 +116,7 @@ impl Pipelines {
             has_homogeneous: profile.media.homogeneous,
             has_airlight: settings.equiangular && scene.airlight_helps(),
             count_fetches: settings.count_fetches,
+            edge_bound: shade.edge_bound,
             ..Default::default()
         };
         let medium = shade.has_media.then(|| gpu.compute_pipeline(&medium)).transpose()?;

@@ -31,6 +31,9 @@ pub(in crate::techniques) const CARD: Card = Card {
         queue::ROWS,
         tracer::ROWS,
         volume::ROWS,
+        volume::transmittance::ROWS,
+        volume::ways::ROWS,
+        volume::footprint::ROWS,
     ],
     bias: BIAS,
     needs: &[],
@@ -45,7 +48,7 @@ pub(in crate::techniques) const CARD: Card = Card {
     path_set: PathSet::ALL,
     refusals,
     settings: SettingsDecl::of::<PhotonSettings>(),
-    variants: &[Variant::DEFAULTS],
+    variants: &VARIANTS,
     foresight: Foresight {
         law,
         ..Foresight::PLAIN
@@ -63,6 +66,33 @@ pub(in crate::techniques) const CARD: Card = Card {
         )?))
     },
 };
+
+/// The defaults, and how media may be seen otherwise: where the mean free path is long beside kernels, beams and planes are far ahead, in dense media collisions are.
+/// Marches are none: they see the collisions of the default under kernels of one dimension more.
+const VARIANTS: [Variant; 4] = [
+    Variant::DEFAULTS,
+    Variant {
+        name: "photon beams",
+        settings: || serde_json::json!({ "volume": "beams" }),
+        suits: scatters_evenly,
+    },
+    Variant {
+        name: "photon planes",
+        settings: || serde_json::json!({ "volume": "planes" }),
+        suits: scatters_evenly,
+    },
+    Variant {
+        name: "collisions and beams",
+        settings: || serde_json::json!({ "volume": "unified" }),
+        // In grids there are collisions alone.
+        suits: |profile| profile.media.scatters && profile.media.homogeneous,
+    },
+];
+
+/// Whether ways and planes can be stored, and something is seen of them: in grids they are refused.
+fn scatters_evenly(profile: &SceneProfile) -> bool {
+    profile.media.scatters && !profile.media.heterogeneous
+}
 
 /// With reduction α, kernels' area falls as passes^(α − 1). What they blur is off by as much, and the variance falls as passes^(−α). The width of beams and the
 /// volume of balls fall so, too, and blur goes with the square of lengths, so that what is off falls as passes^(2(α − 1)) by beams, and by balls as
@@ -206,7 +236,13 @@ impl Technique for PhotonMapper {
         if !self.has_map() {
             skipped.push(Skipped {
                 what: "photons and their map",
-                why: "nothing sends light, or the path set has nothing of a map",
+                why: "nothing sends light, or nothing scatters it diffusely, or the path set has nothing of a map",
+            });
+        }
+        if self.has_map() && !self.has_surface_map() {
+            skipped.push(Skipped {
+                what: "the photon map of surfaces",
+                why: "no surface may be diffuse",
             });
         }
         if self.profile().has_unlit {
@@ -248,6 +284,8 @@ const ROWS: &[Row] = &[Row {
         "tests/tests/photon/settings.rs::parts_of_the_light_sum_to_the_whole",
         "tests/tests/photon/scale.rs::powers_of_two_never_show",
         "tests/tests/photon/traps.rs::glass_is_not_black",
+        "tests/tests/photon/without.rs::without_diffuse_surfaces_there_is_no_map_of_them_and_the_same_bits",
+        "tests/tests/photon/without.rs::maps_of_surfaces_are_made_wherever_a_material_may_be_diffuse",
         "tests/tests/photon/traps.rs::the_ring_has_its_cusp_where_geometry_puts_it",
     ],
     api: &["clerestory::techniques::photon_mapping::PhotonMapper"],
@@ -290,6 +328,23 @@ mod tests {
         ] {
             assert_eq!(of(settings).bias_exponent, 0.0);
         }
+    }
+
+    #[test]
+    fn volume_estimates_are_tried_where_they_can_be_seen() {
+        let tried = |address: &str| {
+            let profile = SceneProfile::of(&crate::scene::load(address).unwrap());
+            let suiting = VARIANTS.iter().filter(|variant| (variant.suits)(&profile));
+            suiting.map(|variant| variant.name).collect::<Vec<_>>()
+        };
+        assert_eq!(tried("builtin:cornell-box"), ["defaults"]);
+        assert_eq!(tried("builtin:smoke?size=8"), ["defaults"]);
+        // Fog that only absorbs shows nothing of photons.
+        assert_eq!(tried("builtin:fog-box?sigma_s=0"), ["defaults"]);
+        assert_eq!(
+            tried("builtin:fog-box"),
+            ["defaults", "photon beams", "photon planes", "collisions and beams"]
+        );
     }
 
     #[test]

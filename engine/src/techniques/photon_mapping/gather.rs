@@ -32,6 +32,8 @@ const NEAREST_SEARCHES: u32 = NEAREST_ROUNDS + NEAREST_HALVINGS;
 
 /// Each point by itself, or those of a subgroup together.
 enum Query {
+    /// No surface may be diffuse: no point asks, and there is no map that could be asked.
+    None,
     Single(ComputePipeline<photon_gather::Kernel>),
     Packet(ComputePipeline<photon_gather_packet::Kernel>),
 }
@@ -43,7 +45,7 @@ enum Linear {
         Box<photon_gather::Spec>,
         OnceLock<ComputePipeline<photon_gather::Kernel>>,
     ),
-    /// Refused: a pass through all records cannot find neighbours.
+    /// Refused: a pass through all records cannot find neighbours. Where no point asks, none is stopped.
     Refuse,
 }
 
@@ -97,7 +99,9 @@ impl Gather {
             of_rays: false,
         };
         let queues = QueueMemory::new(gpu, settings.queue, slots)?;
-        let queue = Queue::new(gpu, scene, &queues, ask)?;
+        // Places themselves are no queue.
+        let asks = scene.has_diffuse_base();
+        let queue = Queue::new(gpu, scene, if asks { &queues } else { &QueueMemory::Slots }, ask)?;
         let nearest = settings.neighbors > 0;
         let has_media = scene.profile().media.any();
         // Both entry points have the same constants.
@@ -121,10 +125,7 @@ impl Gather {
             };
         }
         let query = match settings.query {
-            MapQuery::Packet if gpu.caps().subgroup.vote => {
-                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, queue.kind(), false))?)
-            }
-            MapQuery::Packet => {
+            MapQuery::Packet if !gpu.caps().subgroup.vote => {
                 return Err(Error::MissingFeature {
                     feature: "VK_SUBGROUP_FEATURE_VOTE_BIT".into(),
                     needed_by: "photon_gather_packet".into(),
@@ -132,9 +133,13 @@ impl Gather {
                     instead: "ask the map point by point: \"query\": \"single\"".into(),
                 });
             }
+            _ if !asks => Query::None,
+            MapQuery::Packet => {
+                Query::Packet(gpu.compute_pipeline(&spec!(photon_gather_packet, queue.kind(), false))?)
+            }
             MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_gather, queue.kind(), false))?),
         };
-        let linear = if nearest {
+        let linear = if nearest || !asks {
             Linear::Refuse
         } else {
             Linear::Records(Box::new(spec!(photon_gather, QUEUE_SLOTS, true)), OnceLock::new())
@@ -180,20 +185,21 @@ impl Gather {
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = self.queue.pipelines();
-        all.push(match &self.query {
-            Query::Single(kernel) => kernel.info(),
-            Query::Packet(kernel) => kernel.info(),
-        });
+        match &self.query {
+            Query::None => {}
+            Query::Single(kernel) => all.push(kernel.info()),
+            Query::Packet(kernel) => all.push(kernel.info()),
+        }
         all.extend(self.beam.iter().flat_map(Beam::pipelines));
         all
     }
 
-    /// Queries of a map whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
+    /// Queries of a map of surfaces, if there is one, whose photons' fluxes are to be multiplied by `scale`, for `neighbors` within `radius` where these are asked for; in scenes with media also
     /// of the map of events there.
     pub fn stage<'a>(
         &'a self,
         scene: &'a GpuScene,
-        map: &'a PhotonMap,
+        map: Option<&'a PhotonMap>,
         events: Option<EventsAsked<'a>>,
         scale: f64,
         (neighbors, radius): (u32, f64),
@@ -269,11 +275,11 @@ fn states_before_rough(eye: &PathSet) -> u32 {
     let mut reached = 1u32;
     loop {
         let before = reached;
-        for (state, word) in successors
+        let reached_before = successors
             .iter()
             .enumerate()
-            .filter(|(state, _)| before >> state & 1 != 0)
-        {
+            .filter(|(state, _)| before >> state & 1 != 0);
+        for (_, word) in reached_before {
             for symbol in 0..PATH_SET_LOBE_COUNT {
                 let after = word >> (PATH_SET_STATE_BITS * symbol) & PATH_SET_DEAD;
                 if 1 << symbol & (LOBE_SPECULAR | LOBE_GLOSSY) != 0 && after != PATH_SET_DEAD {
@@ -369,9 +375,9 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-ST-1",
-        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave",
+        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave; and the first three in one kernel",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "No fused form of all stages stands beside it: it would need the sets of the wave, the ray index, the scene, the media and the map at once, of which Vulkan promises four; queries without a queue are fused with what finds their ways.",
+        limits: "The fused form has the rays, their ways through media and the density estimation along them, in scenes with media, without queues, packets or a kd-tree; collisions of paths, surfaces and shadow rays stay stages of their own, whose push constants it has no room for beside its own, and what a quota stops is left to the stages.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4")],
         shaders: &[
             "shaders/walk/extend.comp",
@@ -379,13 +385,22 @@ pub(crate) const ROWS: &[Row] = &[
             "shaders/techniques/path/path_shade.comp",
             "shaders/walk/shadow.comp",
             "shaders/techniques/photon_mapping/photon_beam.comp",
+            "shaders/techniques/photon_mapping/photon_beam_fused.comp",
             "shaders/techniques/photon_mapping/photon_gather.comp",
         ],
         tests: &[
             "tests/tests/photon/volume_queues.rs::queues_and_packets_of_rays_are_made_for_media_alone",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_are_the_same_in_parts",
+            "tests/tests/photon/volume_stages.rs::fused_stages_make_the_same_picture_in_fewer_passes",
+            "tests/tests/photon/volume_stages.rs::fused_stages_send_rays_towards_planes",
+            "tests/tests/photon/volume_stages.rs::fused_stages_go_through_grids",
+            "tests/tests/photon/volume_stages.rs::queries_that_a_quota_stops_in_a_fused_kernel_are_the_stages",
+            "tests/tests/photon/volume_stages.rs::walks_that_a_quota_stops_in_a_fused_kernel_are_the_stages",
+            "tests/tests/photon/volume_stages.rs::fused_stages_are_the_same_in_parts",
+            "tests/tests/photon/volume_stages.rs::rays_that_a_quota_stops_in_a_fused_kernel_are_the_stages",
+            "tests/tests/photon/volume_stages.rs::fused_stages_are_refused_beside_queues_packets_and_kd_trees",
         ],
-        settings: &["queue", "query"],
+        settings: &["stages", "queue", "query"],
         ..Row::of(file!())
     },
     Row {

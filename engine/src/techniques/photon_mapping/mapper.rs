@@ -7,7 +7,7 @@
 //!
 //! Light paths are parted without overlap: what the eye sees through specular and glossy scattering alone, and the light that arrives
 //! directly where it first sees a diffuse surface or a medium scatters it, are the path tracer's; everything else that arrives there is the maps', one of
-//! surfaces and one of media. Where eye paths go on in media ([`PhotonSettings::volume_paths`]) they share what they find there with the map of media
+//! surfaces and one of media, each only where the scene may have something of it. Where eye paths go on in media ([`PhotonSettings::volume_paths`]) they share what they find there with the map of media
 //! ([`photon_share`](crate::transport::photon_share)): all light that is seen first by a scattering in a medium, but that which a mirror scatters first, as caustics. Glossy lobes are never estimated from the map. Three kinds of light are the eye paths' alone, so that what they give beyond the first diffuse reflection
 //! is missing (unless eye paths go on in a medium): unlit surfaces, emitters behind others with alpha in the same place, and slivers that light sampling leaves out. A photon
 //! that starts inside a solid knows it from where it first meets the inside of one.
@@ -27,7 +27,7 @@ use super::settings::{MapBuild, MediaLengths, PhotonSettings};
 use super::tracer::{PhotonAppend, PhotonCounts, PhotonTracer, Tracing, flux_scale};
 use super::volume::event::{PhotonEvent, unpack_event};
 use super::volume::footprint::EventKernelSettings;
-use super::volume::{EventMap, EventMaps};
+use super::volume::{EventMap, EventMaps, paths_in_flight};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
@@ -42,6 +42,14 @@ use crate::{Error, Result};
 /// Whether photons have somewhere to start.
 pub(super) fn sends_photons(scene: &GpuScene) -> bool {
     scene.has_lights() || scene.glow().is_some()
+}
+
+/// Maps of a pass.
+struct PassMaps {
+    /// Only where surfaces may be diffuse.
+    surfaces: Option<PhotonMap>,
+    /// Only in scenes with media.
+    events: Option<EventMap>,
 }
 
 /// Exact counts, and what the host's share took.
@@ -116,14 +124,14 @@ pub struct PhotonMapper {
 struct Photons {
     tracer: PhotonTracer,
     gather: Gather,
-    maker: MapMaker,
+    /// Only where surfaces may be diffuse.
+    maker: Option<MapMaker>,
     /// Only in scenes with media.
     event_maps: Option<EventMaps>,
     /// The photons of the pass under way, until all of them have landed.
     tracing: Option<Tracing>,
     /// Of the pass under way.
-    map: Option<PhotonMap>,
-    events: Option<EventMap>,
+    maps: Option<PassMaps>,
 }
 
 impl PhotonMapper {
@@ -166,7 +174,8 @@ impl PhotonMapper {
             let cause = "need homogeneous media, but the scene has some with a density grid; take \"ray\", \"unified\" or \"march\"";
             return Err(Error::setting("volume", settings.volume.word(), cause));
         }
-        let has_map = settings.needs_photons() && sends_photons(&scene);
+        let has_surface_map = scene.has_diffuse_base();
+        let has_map = settings.needs_photons() && sends_photons(&scene) && (has_surface_map || has_media);
         // Whether eye paths go on in media, for a share of the photons' light.
         let shares = settings.volume_paths && has_media && has_map;
         let (classes, eye_paths) = (settings.classes(shares)?, settings.eye_paths(has_media, shares)?);
@@ -178,12 +187,13 @@ impl PhotonMapper {
             submission_work: settings.submission_work,
             // What arrives is gathered and counted wave by wave, for each pass of photons.
             full_waves: false,
+            paths_in_flight: paths_in_flight(gpu, &scene),
             ..PathTracerSettings::default()
         };
         let tracer = has_map.then(|| {
             let append = Box::new(PhotonAppend::new(gpu)?);
-            let (plan, estimate) = (settings.plan(has_media), settings.volume);
-            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), estimate)
+            let (plan, stored) = (settings.plan(has_media), (settings.volume, settings.volume_beams));
+            PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), stored)
         });
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must.
@@ -193,11 +203,12 @@ impl PhotonMapper {
             Some(tracer) => Some(Photons {
                 tracer,
                 gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), eye.slots())?,
-                maker: MapMaker::new(gpu, settings.map_build)?,
+                maker: has_surface_map
+                    .then(|| MapMaker::new(gpu, settings.map_build))
+                    .transpose()?,
                 event_maps: has_media.then(|| EventMaps::new(gpu, &settings)).transpose()?,
                 tracing: None,
-                map: None,
-                events: None,
+                maps: None,
             }),
             None => None,
         };
@@ -223,9 +234,14 @@ impl PhotonMapper {
         self.counts
     }
 
-    /// Whether there are photons, and a map of them.
+    /// Whether there are photons, and a map of them, on surfaces or in media.
     pub fn has_map(&self) -> bool {
         self.photons.is_some()
+    }
+
+    /// Whether there is one of photons on surfaces: some surface may be diffuse.
+    pub fn has_surface_map(&self) -> bool {
+        self.photons.as_ref().is_some_and(|photons| photons.maker.is_some())
     }
 
     /// What the scene needs.
@@ -243,7 +259,7 @@ impl PhotonMapper {
         let mut all = self.eye.pipelines();
         if let Some(photons) = &self.photons {
             all.extend(photons.tracer.pipelines());
-            all.extend(photons.maker.pipelines());
+            all.extend(photons.maker.iter().flat_map(MapMaker::pipelines));
             all.extend(photons.event_maps.iter().flat_map(EventMaps::pipelines));
             all.extend(photons.gather.pipelines());
         }
@@ -285,7 +301,7 @@ impl PhotonMapper {
     /// Before the first pass.
     fn begin(&mut self) {
         if let Some(photons) = &mut self.photons {
-            (photons.tracing, photons.map, photons.events) = (None, None, None);
+            (photons.tracing, photons.maps) = (None, None);
             photons.tracer.restart();
         }
     }
@@ -307,7 +323,7 @@ impl PhotonMapper {
         let (path_share, shrunk) = (self.event_path_share(pass), self.settings.event_shrinkage(pass));
         let plane_share = self.plane_share();
         if let Some(photons) = &mut self.photons
-            && photons.map.is_none()
+            && photons.maps.is_none()
         {
             let clock = Instant::now();
             let begun = photons.tracing.take();
@@ -327,34 +343,40 @@ impl PhotonMapper {
                 return Ok(Some(self.eye.step_so_far(timings, samples)));
             }
             let traced = tracing.into_traced();
-            let clock = Instant::now();
             let area = self.scene.surface_area();
-            let made = photons
-                .maker
-                .make(&self.gpu, photons.tracer.records(), traced.records, area)?;
-            let mut seconds = clock.elapsed().as_secs_f64();
-            let (map, figures) = match made {
-                Made::ByHost(map, figures) => (map, Some(figures)),
-                Made::ByDevice(map, building) => {
-                    let built = building.wait()?;
-                    seconds += seconds_of(&built);
-                    timings.push(built);
-                    (map, photons.maker.figures(area)?)
-                }
+            let mut seconds = 0.0;
+            let mut maps = PassMaps {
+                surfaces: None,
+                events: None,
             };
-            if let (Some(maps), Some(events)) = (&mut photons.event_maps, photons.tracer.events()) {
+            if let Some(maker) = &mut photons.maker {
                 let clock = Instant::now();
-                let (map, building) = maps.make(events, traced.events, &event_kernel, shrunk)?;
+                let made = maker.make(&self.gpu, photons.tracer.records(), traced.records, area)?;
+                seconds += clock.elapsed().as_secs_f64();
+                let (map, figures) = match made {
+                    Made::ByHost(map, figures) => (map, Some(figures)),
+                    Made::ByDevice(map, building) => {
+                        let built = building.wait()?;
+                        seconds += seconds_of(&built);
+                        timings.push(built);
+                        (map, maker.figures(area)?)
+                    }
+                };
+                figures.into_iter().for_each(|figures| self.counts.note(figures));
+                maps.surfaces = Some(map);
+            }
+            if let (Some(maker), Some(events)) = (&mut photons.event_maps, photons.tracer.events()) {
+                let clock = Instant::now();
+                let (map, building) = maker.make(events, traced.events, &event_kernel, shrunk)?;
                 seconds += clock.elapsed().as_secs_f64();
                 if let Some(building) = building {
                     let built = building.wait()?;
                     seconds += seconds_of(&built);
                     timings.push(built);
                 }
-                photons.events = Some(map);
+                maps.events = Some(map);
             }
-            figures.into_iter().for_each(|figures| self.counts.note(figures));
-            photons.map = Some(map);
+            photons.maps = Some(maps);
             self.counts.map_seconds += seconds;
             self.counts.passes += 1;
             self.counts.photons += traced.counts;
@@ -365,15 +387,14 @@ impl PhotonMapper {
         let stage = match &self.photons {
             Some(Photons {
                 gather,
-                map: Some(map),
-                events,
+                maps: Some(maps),
                 ..
             }) => {
                 let nearest = (self.settings.neighbors_in(pass), kernel.length_max * kernel.unit_length);
                 Some(gather.stage(
                     &self.scene,
-                    map,
-                    events.as_ref().map(|map| EventsAsked {
+                    maps.surfaces.as_ref(),
+                    maps.events.as_ref().map(|map| EventsAsked {
                         map,
                         radius: event_kernel.length_max,
                         plane_share,
@@ -401,7 +422,7 @@ impl PhotonMapper {
         if self.eye.has_ended_pass(done, each)
             && let Some(photons) = &mut self.photons
         {
-            (photons.map, photons.events) = (None, None);
+            photons.maps = None;
         }
         timings.append(&mut step.timings);
         Ok(Some(self.eye.step_so_far(timings, samples)))
@@ -469,13 +490,13 @@ impl PhotonMapper {
     }
 
     /// Traces the photons of a pass and reads their map back as `build` makes it, which is the same whoever does. The picture is not touched,
-    /// and counts go on; `None` where there are no photons.
+    /// and counts go on; `None` where there are no photons, or no surface may be diffuse.
     ///
     /// # Errors
     /// As [`PhotonMapper::step`] and [`map_contents`](super::map_contents).
     pub fn map(&mut self, pass: u32, build: MapBuild) -> Result<Option<MapContents>> {
         let kernel = self.kernel(pass);
-        let Some(photons) = &mut self.photons else {
+        let Some(photons) = self.photons.as_mut().filter(|photons| photons.maker.is_some()) else {
             return Ok(None);
         };
         photons.tracing = None;

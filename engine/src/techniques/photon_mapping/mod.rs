@@ -3,6 +3,7 @@
 pub mod kernel;
 
 mod card;
+mod collisions;
 mod device_map;
 mod gather;
 mod glow;
@@ -16,9 +17,10 @@ mod tracer;
 pub mod volume;
 
 pub(super) use card::CARD;
+pub(super) use collisions::{CollisionPass, CollisionStage};
 pub use gather::{GatherCounts, RayFetches};
 pub use map::{MapContents, map_contents};
 pub use mapper::{MappedEvent, MappedPhoton, MapperCounts, PhotonMapper};
-pub use settings::{MapBuild, MapQuery, MapQueue, PhotonSettings};
+pub use settings::{MapBuild, MapQuery, MapQueue, MapStages, PhotonSettings};
 pub use tracer::PhotonCounts;
 pub(super) use tracer::{Append, PhotonPlan, PhotonTracer, Stored, Tracing};

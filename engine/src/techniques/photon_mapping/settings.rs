@@ -4,6 +4,8 @@ use super::kernel::{KernelProfile, KernelSettings, KernelShape};
 use super::path_classes::PathClasses;
 use super::tracer::{PhotonPlan, Stored};
 use super::volume::footprint::{EventKernelSettings, event_step};
+use super::volume::transmittance::VolumeTransmittance;
+use super::volume::ways::BeamLength;
 use super::volume::{VolumeEstimate, VolumeKernel};
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
@@ -75,6 +77,18 @@ pub enum MapQueue {
     Blocks,
 }
 
+/// In how many kernels eye paths get what photons in media give them, bounce by bounce.
+///
+/// Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapStages {
+    /// A kernel for the closest hits of rays, and others for their ways through media and what they see there.
+    Stream,
+    /// One kernel for all three.
+    Fused,
+}
+
 /// Who builds the map. The same bytes either way, where the device rounds numbers of 64 bits as IEEE 754 says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -133,8 +147,18 @@ crate::settings! {
         /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there; or collisions and ways together, each
         /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin; in grids there are collisions alone.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
+        /// How far ways of photons are stored, of estimates that have some: to the next surface, weighted by what is left of light along them, or each as far as a flight comes, which is as light in
+        /// the band that comes farthest does. Short ones are fewer to meet, which takes less time and memory, and noisier.
+        pub volume_beams: BeamLength = BeamLength::Long;
+        /// What a density grid leaves of light along an eye ray: a walk finds it by ratio tracking, the same for all photons that the ray sees, and unbiased for each; or a table of its
+        /// logarithm at 64 places, which has no noise and takes as long in any grid, but errs by what the density does within a 64th of the way.
+        pub volume_transmittance: VolumeTransmittance = VolumeTransmittance::Walk;
         /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
+        /// Which of the other events of a medium, counted from the nearest, lies on the rim of a kernel in media by neighbours.
+        ///
+        /// The source has 85; others that compare kernels by neighbours in media have 117.
+        pub volume_neighbors: u32 = 85, in 1..=1000, unit "photons";
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.
         ///
         /// 0 stands for the radius of fixed kernels under which rays meet some tens of them, which a small picture of few photons finds out, at most a fiftieth of the scene's diagonal
@@ -162,6 +186,9 @@ crate::settings! {
         /// Invocations of queries serve every path under way, or only those that query the map in question, found by stream compaction or in blocks that
         /// subgroups collect; changes pictures only as query does. Rays have each queue, single and in packets, with every estimate of volume.
         pub queue: MapQueue = MapQueue::Slots;
+        /// In scenes with media a kernel finds the closest hits of eye rays, and others their ways through media and what they see there, or one does all that; without media there is nothing to
+        /// fuse. Never changes the picture. With slots and single queries alone, and not over a kd-tree.
+        pub stages: MapStages = MapStages::Stream;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.
         pub map_build: MapBuild = MapBuild::Auto;
@@ -196,6 +223,10 @@ impl PhotonSettings {
                 self.volume.word()
             );
             return Err(Error::setting("volume_kernel", self.volume_kernel.word(), cause));
+        }
+        if self.stages == MapStages::Fused && (self.queue != MapQueue::Slots || self.query != MapQuery::Single) {
+            let cause = "needs \"queue\": \"slots\" and \"query\": \"single\": a queue is filled between the kernels that it fuses";
+            return Err(Error::setting("stages", "fused", cause));
         }
         if self.volume_paths && self.volume != VolumeEstimate::Unified {
             let cause = format!("needs \"volume\": \"unified\", but that is \"{}\"", self.volume.word());

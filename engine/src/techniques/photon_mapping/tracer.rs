@@ -21,10 +21,12 @@ pub(in crate::techniques) use plan::{PhotonPlan, Stored};
 use std::sync::Arc;
 
 use self::stages::PhotonStages;
+use super::collisions::CollisionStage;
 use super::glow::GlowStage;
 use super::kernel::KernelSettings;
 use super::path_classes::PathClasses;
 use super::volume::footprint::EventKernelSettings;
+use super::volume::ways::BeamLength;
 use super::volume::{VolumeEstimate, VolumeOptions, VolumeTrace};
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::ash::vk;
@@ -129,7 +131,7 @@ struct Kit {
     emission: Option<TexelView>,
     /// Only where media emit.
     glow: Option<GlowStage>,
-    /// Only in scenes with media.
+    /// Only in scenes with media, unless `append` has a stage for collisions.
     volume: Option<VolumeTrace>,
     /// Of expressions: successors of classes, and those by scattering in media.
     classes: Option<(Buffer, [u32; 2])>,
@@ -137,21 +139,22 @@ struct Kit {
 
 impl PhotonTracer {
     pub fn new(gpu: &Gpu, scene: Arc<GpuScene>, plan: PhotonPlan, append: Box<dyn Append>) -> Result<Self> {
-        Self::in_media(gpu, scene, plan, append, None, VolumeEstimate::Ray)
+        Self::in_media(gpu, scene, plan, append, None, (VolumeEstimate::Ray, BeamLength::Long))
     }
 
-    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep what an estimate sees.
+    /// As [`PhotonTracer::new`], of photons that are told apart by their class, where there are some, and of which media keep what an estimate sees, with beams of a length.
     pub(super) fn in_media(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
         plan: PhotonPlan,
         append: Box<dyn Append>,
         classes: Option<&PathClasses>,
-        estimate: VolumeEstimate,
+        (estimate, beams): (VolumeEstimate, BeamLength),
     ) -> Result<Self> {
         let media = VolumeOptions {
             has_classes: classes.is_some(),
             estimate,
+            beams,
         };
         let (profile, bsdf) = (scene.profile(), scene.bsdf_features());
         let has_differentials = plan.follows_footprints;
@@ -193,10 +196,16 @@ impl PhotonTracer {
         let differentials = if has_differentials { slots } else { 1 };
         let work = |name, bytes: usize| gpu.buffer(&BufferDesc::storage(name, bytes as u64, Category::Work));
         let quarters = append.quarters();
-        let capacity = (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
+        let capacity = if plan.stores_lights || scene.has_diffuse_base() {
+            (u64::from(plan.photons) * RECORDS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32
+        } else {
+            // None is deposited, but there is no buffer of nothing.
+            1
+        };
         let buffers = WaveBuffers::new(gpu, slots, needs)?;
         let volume = || VolumeTrace::new(gpu, &scene, &plan, media, slots);
-        let volume = profile.media.any().then(volume).transpose()?;
+        let has_volume = profile.media.any() && append.collisions().is_none();
+        let volume = has_volume.then(volume).transpose()?;
         Ok(Self {
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
             kit: Kit {
@@ -262,6 +271,7 @@ impl PhotonTracer {
             Some(volume) => all.extend(volume.pipelines()),
             None => all.push(kit.append.pipeline()),
         }
+        all.extend(kit.append.collisions().map(CollisionStage::pipeline));
         all.extend(self.walker.trace_pipelines());
         all.extend(self.walker.compaction_pipelines());
         all
@@ -339,6 +349,8 @@ impl PhotonTracer {
         let traced = &mut tracing.traced;
         let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
         let [absorbed, events] = volume.unwrap_or_default();
+        let collided = self.kit.append.collisions().map(CollisionStage::counts).transpose()?;
+        let [collided, kept] = collided.unwrap_or_default();
         // What waits are the deposits with a kernel, and in scenes with media what comes from these besides.
         let records = match volume {
             Some(_) => counters.deposits - counters.without_kernel,
@@ -346,11 +358,11 @@ impl PhotonTracer {
         };
         traced.records = traced.records.saturating_add(records);
         traced.events = traced.events.saturating_add(events);
-        traced.counts.events += u64::from(events);
+        traced.counts.events += u64::from(events) + u64::from(kept);
         traced.counts.collisions += walked.media.collisions;
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
-        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed);
+        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed) + u64::from(collided);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
@@ -374,7 +386,7 @@ impl PhotonTracer {
         if needed > most {
             return Err(Error::Overflow {
                 kernel: self.kit.append.name().into(),
-                what: self.kit.append.records().into(),
+                what: records_within_limit(&self.gpu, self.kit.append.records()),
                 needed,
                 capacity: most,
                 instead: self.kit.append.fewer().into(),
@@ -428,11 +440,23 @@ pub(super) fn flux_scale(scene: &GpuScene) -> f64 {
     if power > 0.0 { STORED_FLUX / power } else { 1.0 }
 }
 
-/// Records of so many quarters that a buffer of the device can hold.
-fn records_of_device(gpu: &Gpu, of_record: u32) -> u64 {
+/// Records of so many quarters that a buffer of the device can hold: 2²² of two where one has 128 MiB.
+pub(super) fn records_of_device(gpu: &Gpu, of_record: u32) -> u64 {
     let caps = gpu.caps();
     let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
     (quarters / u64::from(of_record)).min(u64::from(u32::MAX / 2))
+}
+
+/// What errors call records that are more than those: with the limit of the device's.
+pub(super) fn records_within_limit(gpu: &Gpu, records: &str) -> String {
+    let caps = gpu.caps();
+    let by_texels = caps.max_texel_buffer_elements < caps.max_storage_buffer_range / 16;
+    let limit = if by_texels {
+        "maxTexelBufferElements"
+    } else {
+        "maxStorageBufferRange"
+    };
+    format!("{records} within {limit}")
 }
 
 fn record_texels(gpu: &Gpu, records: u32, of_record: u32) -> Result<TexelView> {

@@ -2,6 +2,7 @@
 
 use crate::scene::{FresnelForm, Material};
 use crate::transport::albedo::AlbedoTable;
+use glam::Vec3;
 
 /// Which terms are compiled in: the values of the shader's specialization constants of the same names in capitals (`HAS_METAL` …).
 ///
@@ -91,6 +92,16 @@ impl BsdfFeatures {
                 separable_masking: false,
             })
     }
+}
+
+/// Whether a surface of the material may have a diffuse base (`bsdf_has_diffuse_base`); textures can only lower a factor.
+pub(crate) fn may_have_diffuse_base(material: &Material) -> bool {
+    let lowered = |factor: f32, has_texture: bool| factor < 1.0 || has_texture;
+    !material.unlit
+        && !material.boundary
+        && material.base_color.truncate() != Vec3::ZERO
+        && lowered(material.metallic, material.metallic_roughness_texture.is_some())
+        && lowered(material.transmission, material.transmission_texture.is_some())
 }
 
 /// The features and the table that the twin functions read, as the shader reads its constants and its buffer.

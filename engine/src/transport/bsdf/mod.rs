@@ -23,6 +23,7 @@ mod parameters;
 
 use glam::{DVec2, DVec3};
 
+pub(crate) use self::features::may_have_diffuse_base;
 pub use self::features::{BsdfContext, BsdfFeatures};
 pub use self::label::bsdf_label;
 use self::lobes::{CosineLobes, reflection_probability, refraction_scale};

@@ -45,7 +45,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     id: "MET-F6",
     name: "table of Fresnel factor times simplified geometric term",
     role: Role::Kernel,
-    limits: "One metal a table of 4 KiB; up to 0.06 % off, and cut off at cosines below 2^-10.",
+    limits: "One metal a table of 4 KiB for a host's own kernels, and no form that materials name; up to 0.06 % off, and cut off at cosines below 2^-10.",
     sources: &[sources::KELEMEN_SZIRMAY_KALOS_2001.whole()],
     shaders: &["shaders/transport/fresnel_table.glsl"],
     bias: Some(Bias::Biased("linear interpolation, and a cut near grazing incidence")),

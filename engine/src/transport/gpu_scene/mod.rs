@@ -35,7 +35,7 @@ use self::media::GpuMedia;
 use self::punctual::PunctualLights;
 use self::textures::Textures;
 use super::albedo::AlbedoTable;
-use super::bsdf::BsdfFeatures;
+use super::bsdf::{BsdfFeatures, may_have_diffuse_base};
 use crate::accel::two_level::{TwoLevelBvh, TwoLevelWork};
 use crate::accel::{DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, IndexReport, IndexStatistics, RayIndex};
 use crate::gpu::ash::vk;
@@ -52,6 +52,7 @@ use crate::{Error, Result};
 pub struct GpuScene {
     profile: SceneProfile,
     bsdf: BsdfFeatures,
+    has_diffuse_base: bool,
     objects: Vec<ObjectTriangles>,
     bounds: [Vec3; 2],
     surface_area: f64,
@@ -194,7 +195,9 @@ impl GpuScene {
         let placed = materials
             .iter()
             .filter(|(material, placed)| *placed && !material.boundary);
-        let bsdf = BsdfFeatures::of_materials(placed.map(|(material, _)| *material));
+        let placed = placed.map(|(material, _)| *material);
+        let has_diffuse_base = placed.clone().any(may_have_diffuse_base);
+        let bsdf = BsdfFeatures::of_materials(placed);
         let (mut textures, mut metals) = (Textures::default(), Metals::default());
         let records: Vec<_> = materials
             .iter()
@@ -217,6 +220,7 @@ impl GpuScene {
         let glow = glow.and_then(|bodies| Glow::new(scene, surrounding, bodies));
         Ok(Self {
             bsdf,
+            has_diffuse_base,
             // What is rasterized is drawn triangle by triangle.
             objects: match profile.keeps_instances {
                 true => Vec::new(),
@@ -253,6 +257,11 @@ impl GpuScene {
     /// What its materials need of the scattering function.
     pub fn bsdf_features(&self) -> BsdfFeatures {
         self.bsdf
+    }
+
+    /// Whether light may be scattered diffusely by some surface: where it is not, no map of photons on surfaces has anything.
+    pub(crate) fn has_diffuse_base(&self) -> bool {
+        self.has_diffuse_base
     }
 
     /// Size and quality of its ray index, as it is now.

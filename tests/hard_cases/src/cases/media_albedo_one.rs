@@ -27,6 +27,7 @@ pub(super) const CASE: HardCase = HardCase {
         "Photons of the map lack beyond the boundary of a medium: what a ray sees within a kernel's radius of it, a quarter of a mean free path, is too dark where it is not met \
          head-on. Kernels shrink from pass to pass; choose a smaller radius.",
     ),
+    of_media: true,
     techniques: Some(judge),
     ..HardCase::BASE
 };

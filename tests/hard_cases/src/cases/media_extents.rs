@@ -12,6 +12,7 @@ pub(super) const CASE: HardCase = HardCase {
     breaks: "Free flights step by constants in metres, exp(−σ t) underflows, and the logarithm of 0 is infinite where nothing is left.",
     expects: "A floor of radiance 1 seen through t metres of an absorbing medium has exp(−σ t), for σ from 0 to 10⁴ m⁻¹ and t from 10⁻⁴ to 10⁴ m; through 10⁴ optical depths exactly 0.",
     picture: || Ok(scene(1.0, 0.7)),
+    of_media: true,
     techniques: Some(judge),
     ..HardCase::BASE
 };

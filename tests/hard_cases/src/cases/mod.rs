@@ -14,9 +14,15 @@ mod light_inside_geometry;
 mod lights_without_power;
 mod many_lights;
 mod media_albedo_one;
+mod media_albedo_zero;
+mod media_behind_a_wall;
 mod media_extents;
 mod media_grids;
+mod media_holes;
+mod media_inside;
 mod media_narrow_phase;
+mod media_thin_sheet;
+mod media_uneven_bands;
 mod million_samples;
 mod mirrors;
 mod nested_dielectrics;
@@ -56,6 +62,12 @@ pub(crate) const ALL: &[HardCase] = &[
     picture_sizes::CASE,
     media_extents::CASE,
     media_albedo_one::CASE,
+    media_albedo_zero::CASE,
     media_narrow_phase::CASE,
+    media_uneven_bands::CASE,
     media_grids::CASE,
+    media_thin_sheet::CASE,
+    media_inside::CASE,
+    media_holes::CASE,
+    media_behind_a_wall::CASE,
 ];

@@ -221,6 +221,32 @@ fn kept_lights_have_all_of_the_power() {
     });
 }
 
+/// Walks of the same random numbers land near where they landed in the frame before: under a lamp that goes on by small steps, pictures change far less than those of new walks.
+#[test]
+fn the_same_walks_change_less_from_frame_to_frame() {
+    const FRAMES: u32 = 10;
+    with_gpu(|gpu| {
+        let at = |step: u32| point(Vec3::new(0.5 - 0.01 * step as f32, 1.7, 0.2));
+        let settings = ManyLightSettings {
+            interleave: 1,
+            ..of(INDIRECT, exact())
+        };
+        let mut moving = Moving::new(gpu, lit_by(hall(), &[at(0)]), SIZE, settings);
+        let mut change = |seed_of: fn(u32) -> u32| {
+            let mut pictures = Vec::new();
+            for step in 0..FRAMES {
+                moving.renderer.restart(seed_of(step)).expect("a seed");
+                pictures.push(moving.frame(at(step)).0);
+            }
+            let squares = pictures.windows(2).map(|pair| rmse(&pair[1], &pair[0]).powi(2));
+            squares.sum::<f64>() / f64::from(FRAMES - 1)
+        };
+        let (same, new) = (change(|_| 5), change(|step| 5 + step));
+        println!("mean squared change {same} with the same walks, {new} with new ones");
+        assert!(same > 0.0 && same < 0.5 * new, "{same} {new}");
+    });
+}
+
 /// Every picture, of so many frames, is of another seed, and so independent of the others.
 pub(super) fn seeds(gpu: &Gpu, scene: &Scene, settings: &ManyLightSettings, each: u32, count: u32) -> Passes {
     let mut renderer = frames(gpu, scene, SIZE, settings);

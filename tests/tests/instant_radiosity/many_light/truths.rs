@@ -145,6 +145,7 @@ fn all_of_a_lights_power_arrives_on_the_plane() {
     });
 }
 
+/// With the root of independent walks, and faster with those of Sobol' points.
 #[test]
 fn errors_fall_with_the_root_of_the_lights() {
     const SEEDS: u32 = 32;
@@ -156,10 +157,11 @@ fn errors_fall_with_the_root_of_the_lights() {
         let reference = render(gpu, &scene, SIZE, 16_384, &paths(INDIRECT));
         let expected = mean(&reference.radiance, 0);
         // All pixels of a frame have the same lights: few are as good as many.
-        let error = |lights| {
+        let error = |lights, sampler| {
             let settings = ManyLightSettings {
                 lights,
                 interleave: 1,
+                sampler,
                 ..of(INDIRECT, exact())
             };
             let mut renderer = frames(gpu, &scene, [2; 2], &settings);
@@ -169,20 +171,24 @@ fn errors_fall_with_the_root_of_the_lights() {
             });
             (squares.sum::<f64>() / f64::from(SEEDS)).sqrt()
         };
-        let errors = LIGHTS.map(error);
         // The slope of the line through all of them in the logarithms, whose abscissas are two octaves apart.
         let steps = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|step| 2.0 * step);
         let squares: f64 = steps.iter().map(|step| step * step).sum();
-        let products = steps.iter().zip(&errors).map(|(step, error)| step * error.log2());
-        let slope = products.sum::<f64>() / squares;
         // A root mean square of n errors is off by 1/√(2n) of itself.
         let deviation = std::f64::consts::LOG2_E / (f64::from(2 * SEEDS) * squares).sqrt();
-        println!("{errors:?}, slope {slope} ± {deviation}");
-        assert!(
-            (slope + 0.5).abs() < 3.0 * deviation,
-            "{errors:?}: {slope} ± {deviation}"
-        );
-        assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
+        let [independent, even] = [SamplerKind::Pcg, SamplerKind::Sobol].map(|sampler| {
+            let errors = LIGHTS.map(|lights| error(lights, sampler));
+            let products = steps.iter().zip(&errors).map(|(step, error)| step * error.log2());
+            let slope = products.sum::<f64>() / squares;
+            println!("{sampler:?}: {errors:?}, slope {slope} ± {deviation}");
+            assert!(
+                errors.windows(2).all(|pair| pair[1] < pair[0]),
+                "{sampler:?}: {errors:?}"
+            );
+            (errors[LIGHTS.len() - 1], slope)
+        });
+        assert!((independent.1 + 0.5).abs() < 3.0 * deviation, "{independent:?}");
+        assert!(even.1 < -0.5 && even.0 < independent.0, "{even:?} {independent:?}");
     });
 }
 
@@ -272,7 +278,6 @@ fn walls_that_emit_bring_their_own_radiosity() {
         scene.place(cuboid("body", matte, lower, upper));
         scene.cameras = vec![orthographic(DVec3::Y * 0.9, DVec3::ZERO, -DVec3::Z, 0.2)];
         let settings = ManyLightSettings {
-            emitters: 64,
             sampler: SamplerKind::Sobol,
             ..of("bounces=1,lobes=diffuse+glossy", exact())
         };

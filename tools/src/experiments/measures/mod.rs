@@ -111,6 +111,7 @@ measures! {
     on_device "cycles" rendering::cycles;
     on_device "deferred-stages" virtual_lights::deferred_stages;
     on_device "device-model" device::device_model;
+    on_device "fog-peers" rendering::fog_peers;
     on_host "free-flight" media::free_flight;
     on_device "fresnel-cost" surfaces::fresnel_cost;
     on_host "fresnel-dielectric" surfaces::fresnel_dielectric;
@@ -193,15 +194,19 @@ measures! {
     on_device "view-shadows" preview::view_shadows;
     on_host "volume-bands" media::volume_bands;
     on_device "volume-bandwidths" photons::volume_bandwidths;
+    on_device "volume-choice" photons::volume_choice;
+    on_device "volume-crossover" photons::volume_crossover;
     on_device "volume-dampening" photons::volume_dampening;
     on_device "volume-frame" photons::volume_frame;
-    on_device "volume-peers" rendering::volume_peers;
+    on_device "volume-peers" photons::volume_peers;
     on_device "volume-scenes" photons::volume_scenes;
     on_device "volume-queues" photons::volume_queues;
+    on_device "volume-transmittance" photons::volume_transmittance;
     on_device "vpl-history" virtual_lights::vpl_history;
     on_device "vpl-incremental" virtual_lights::vpl_incremental;
     on_host "vpl-order" virtual_lights::vpl_order;
     on_device "vpl-potential" virtual_lights::vpl_potential;
+    on_device "vpl-sight" virtual_lights::vpl_sight;
     on_host "vpl-spikes" virtual_lights::vpl_spikes;
     on_host "vpl-walks" virtual_lights::vpl_walks;
     on_host "vpl-warp" preview::vpl_warp;

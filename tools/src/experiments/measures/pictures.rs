@@ -1,9 +1,11 @@
 //! Small pictures for measures.
 
 use clerestory::Result;
+use clerestory::film::png::Rgb8;
 use clerestory::film::z_test::{ZTest, z_test};
 use clerestory::film::{Picture, picture};
 use clerestory::render::{FrameReport, RenderOptions, Renderer};
+use clerestory::srgb::srgb_byte;
 use clerestory::techniques::Technique;
 use serde_json::json;
 
@@ -27,6 +29,50 @@ pub fn mean(picture: &Picture) -> Result<f64> {
 /// The mean of values; 0 of none.
 pub fn mean_of(values: &[f32]) -> f64 {
     values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The mean of pictures of one size, value by value; empty of none.
+pub fn mean_picture<'a>(pictures: impl IntoIterator<Item = &'a [f32]>) -> Vec<f32> {
+    let (mut sums, mut count) = (Vec::new(), 0.0_f64);
+    for picture in pictures {
+        sums.resize(picture.len(), 0.0_f64);
+        for (sum, value) in sums.iter_mut().zip(picture) {
+            *sum += f64::from(*value);
+        }
+        count += 1.0;
+    }
+    sums.into_iter().map(|sum| (sum / count) as f32).collect()
+}
+
+/// A small picture: a color for each pixel, row by row.
+pub type Panel = Vec<[u8; 3]>;
+
+/// Light, RGB a pixel, up to what is white.
+pub fn light_panel(radiance: &[f32], white: f64) -> Panel {
+    let color = |pixel: &[f32; 3]| pixel.map(|value| srgb_byte(f64::from(value) / white));
+    radiance.as_chunks::<3>().0.iter().map(color).collect()
+}
+
+/// Panels of one size in rows, black where a row has fewer than another, with so many pixels along a side for each of theirs.
+pub fn tiled([width, height]: [u32; 2], enlarged: u32, rows: &[Vec<Panel>]) -> Rgb8 {
+    let across = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let [width_shown, height_shown] = [width * enlarged, height * enlarged];
+    let mut bytes = Vec::new();
+    for row in rows {
+        for y in 0..height_shown {
+            for place in 0..across {
+                for x in 0..width_shown {
+                    let pixel = (y / enlarged * width + x / enlarged) as usize;
+                    bytes.extend(row.get(place).map_or([0; 3], |panel| panel[pixel]));
+                }
+            }
+        }
+    }
+    Rgb8 {
+        width: width_shown * across as u32,
+        height: height_shown * rows.len() as u32,
+        bytes,
+    }
 }
 
 /// A picture with the variance of its means.

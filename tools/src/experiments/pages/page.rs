@@ -52,11 +52,11 @@ pub fn files(experiment: &Experiment, stored: Option<&Stored>) -> Result<Vec<Fil
 
 fn page(experiment: &Experiment, stored: Option<&Stored>, found: &Findings, shown: &[String]) -> String {
     let mut parts = vec![format!("# {}\n", experiment.title), found.summary()];
-    parts.extend(shown.first().cloned());
-    parts.push(experiment.about.trim_end().to_owned() + "\n");
     if !experiment.causes.is_empty() {
         parts.push(experiment.causes.trim_end().to_owned() + "\n");
     }
+    parts.extend(shown.first().cloned());
+    parts.push(experiment.about.trim_end().to_owned() + "\n");
     for (index, table) in found.tables.iter().enumerate() {
         let file = format!("{}.csv", index + 1);
         parts.push(if table.is_long {
@@ -105,4 +105,27 @@ fn how_it_was_run(Stored { run, .. }: &Stored, facts: &[String]) -> String {
         run.load[1],
         super::stored::FILE,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::find;
+
+    #[test]
+    fn causes_of_a_measure_stand_between_its_verdicts_and_what_it_is_about() {
+        const CAUSE: &str = "Rays are few.";
+        let experiment = Experiment {
+            causes: CAUSE.into(),
+            ..find("alpha").unwrap()
+        };
+        let all = files(&experiment, None).unwrap();
+        let page = &all.iter().find(|file| file.name == FILE).unwrap().text;
+        let place = |words: &str| page.find(words).unwrap();
+        let causes = place(CAUSE);
+        assert!(
+            place("**undecided**") < causes && causes < place(experiment.about_in_short()),
+            "{page}"
+        );
+    }
 }

@@ -190,16 +190,20 @@ fn layers_hold_what_lies_behind() {
 /// A sphere about the map's place: errors of distances, and the fixed point at once.
 #[test]
 fn spherical_surroundings_give_the_published_distances() {
+    // Published as less than this.
+    const LEAST: f64 = 1e-9;
     let scene = ImpostorScene {
         distance: |_: u32, _: DVec3| 1.5,
         layers: 1,
         extent: [1.5, 1.5],
     };
-    let published: [(SearchMethod, u32, [f64; 2]); 5] = [
+    let published: [(SearchMethod, u32, [f64; 2]); 7] = [
         (SecantFromGuess, 0, [2.6e-3, 3.1e-2]),
         (FalsePosition, 1, [9.2e-3, 0.22]),
         (FalsePosition, 3, [8.1e-6, 3.6e-3]),
+        (FalsePosition, 5, [1.4e-8, 7.5e-5]),
         (Mixed, 3, [1.9e-7, 1.1e-4]),
+        (SecantFromGuess, 3, [LEAST, LEAST]),
         (FixedPoint, 0, [0.0, 0.0]),
     ];
     for (method, steps, published) in published {
@@ -217,7 +221,7 @@ fn spherical_surroundings_give_the_published_distances() {
             );
             // The worst of other rays is less; powers of it are less by as much more.
             assert!(
-                worst <= 1.2 * published + 1e-12 && worst >= 0.4 * published,
+                worst <= 1.2 * published + 1e-12 && (worst >= 0.4 * published || published <= LEAST),
                 "{worst:e} {published:e}"
             );
         }

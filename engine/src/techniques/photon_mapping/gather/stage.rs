@@ -17,7 +17,8 @@ use crate::{Error, Result};
 pub(in crate::techniques::photon_mapping) struct GatherStage<'a> {
     pub(super) gather: &'a Gather,
     pub(super) scene: &'a GpuScene,
-    pub(super) map: &'a PhotonMap,
+    /// None where no point asks.
+    pub(super) map: Option<&'a PhotonMap>,
     /// Of stored fluxes, in W a photon.
     pub(super) scale: f32,
     pub(super) neighbors: u32,
@@ -51,12 +52,12 @@ impl GatherStage<'_> {
         }
     }
 
-    fn set(&self) -> PhotonMapSet<'_> {
+    fn set<'a>(&'a self, map: &'a PhotonMap) -> PhotonMapSet<'a> {
         PhotonMapSet {
-            photon_pairs: &self.map.pairs,
-            photon_map_records: &self.map.records,
+            photon_pairs: &map.pairs,
+            photon_map_records: &map.records,
             gather_counters: self.gather.counters.view(),
-            photon_map_root: self.map.root.view(),
+            photon_map_root: map.root.view(),
             photon_beam_ways: self
                 .gather
                 .beam
@@ -64,20 +65,21 @@ impl GatherStage<'_> {
                 .map_or(self.gather.counters.view(), Beam::ways),
         }
     }
-}
 
-impl ArrivalStage for GatherStage<'_> {
-    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+    /// Records what comes behind queries of the volume map: rays towards planes, and queries on surfaces.
+    fn record_behind_beams(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
         let gather = self.gather;
-        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
-        if let Some(beam) = &self.beam {
-            beam.record(recorder, self.scene, wave, places)?;
-        }
         if let Some(planes) = self.beam.as_ref().and_then(BeamStage::planes) {
             recorder.pass("photon: plane rays", |pass| {
                 planes.record(pass, self.scene, wave, places)
             })?;
         }
+        let Some(map) = self.map else { return Ok(()) };
+        let (scene, map, queue) = (
+            self.scene.scene_set(),
+            self.set(map),
+            gather.queue.set(&gather.counters),
+        );
         let mut groups = places.items;
         if gather.queue.collects() {
             recorder.pass("photon: gather queue", |pass| {
@@ -90,12 +92,33 @@ impl ArrivalStage for GatherStage<'_> {
         recorder.pass("photon: gather", |pass| {
             let (sets, push): ([&dyn BindingSet<'_>; 4], _) = ([wave, &scene, &queue, &map], self.push());
             match &gather.query {
+                Query::None => {}
                 Query::Single(kernel) => pass.dispatch_indirect(kernel, &sets, &push, groups)?,
                 Query::Packet(kernel) => pass.dispatch_indirect(kernel, &sets, &bytemuck::cast(push), groups)?,
             }
             stage_barrier(pass);
             Ok(())
         })
+    }
+}
+
+impl ArrivalStage for GatherStage<'_> {
+    fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+        if let Some(beam) = &self.beam {
+            beam.record(recorder, self.scene, wave, places)?;
+        }
+        self.record_behind_beams(recorder, wave, places)
+    }
+
+    fn finds_hits(&self) -> bool {
+        self.beam.as_ref().is_some_and(BeamStage::finds_hits)
+    }
+
+    fn record_with_hits(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
+        if let Some(beam) = &self.beam {
+            beam.record_with_hits(recorder, self.scene, wave, places)?;
+        }
+        self.record_behind_beams(recorder, wave, places)
     }
 
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
@@ -158,10 +181,11 @@ impl ArrivalStage for GatherStage<'_> {
                 return Ok(Some(part + 1));
             }
         }
-        if gather.counters_readback.read::<Counters>(0, 1)?[0].stopped == 0 {
+        let stopped_points = gather.counters_readback.read::<Counters>(0, 1)?[0].stopped;
+        let Some(map) = self.map.filter(|_| stopped_points > 0) else {
             // Beams alone have stopped.
             return Ok(None);
-        }
+        };
         let Linear::Records(_, made) = &gather.linear else {
             return Err(Error::Overflow {
                 kernel: "photon_gather".into(),
@@ -176,8 +200,12 @@ impl ArrivalStage for GatherStage<'_> {
             what: "photon map".into(),
             fault: "has stopped queries without the kernel for them".into(),
         })?;
-        let (scene, map, queue) = (self.scene.scene_set(), self.set(), gather.queue.set(&gather.counters));
-        let parts = LinearParts::new(gather.quota, self.map.count, stopped);
+        let parts = LinearParts::new(gather.quota, map.count, stopped);
+        let (scene, map, queue) = (
+            self.scene.scene_set(),
+            self.set(map),
+            gather.queue.set(&gather.counters),
+        );
         let (mut part, mut taken) = (part.saturating_sub(first_part), 0);
         recorder.pass("photon: gather all", |pass| {
             while part < parts.count() && (taken == 0 || taken + parts.cost() <= LINEAR_RECORDS) {

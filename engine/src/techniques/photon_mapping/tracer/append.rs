@@ -5,6 +5,7 @@ use crate::gpu::shaders::constants::PHOTON_QUARTERS;
 use crate::gpu::shaders::sets::PhotonWave;
 use crate::gpu::shaders::techniques::photon_mapping::photon_append;
 use crate::gpu::{ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::techniques::photon_mapping::collisions::CollisionStage;
 use crate::transport::GpuScene;
 use crate::walk::Bounce;
 
@@ -23,6 +24,11 @@ pub(in crate::techniques) trait Append: Send {
     fn fewer(&self) -> &'static str;
 
     fn pipeline(&self) -> PipelineInfo;
+
+    /// What walks do on their ways through media where their collisions become records as well; none where the tracer's own stages do it.
+    fn collisions(&self) -> Option<&dyn CollisionStage> {
+        None
+    }
 
     /// Records what makes those that wait into records behind `first` and the wave's earlier ones, as far as there is room for `capacity`.
     ///

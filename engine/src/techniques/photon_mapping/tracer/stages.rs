@@ -7,6 +7,7 @@ use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::techniques::photon_mapping::{photon_emit, photon_scatter};
 use crate::gpu::shaders::types;
 use crate::gpu::{Pass, Recorder};
+use crate::techniques::photon_mapping::collisions::CollisionPass;
 use crate::techniques::photon_mapping::glow::GlowStage;
 use crate::techniques::photon_mapping::kernel::KernelSettings;
 use crate::techniques::photon_mapping::volume::footprint::EventKernelSettings;
@@ -59,6 +60,8 @@ impl PhotonStages<'_> {
 impl WalkStages for PhotonStages<'_> {
     fn reset(&self, pass: &mut Pass<'_>) -> Result<()> {
         self.kit.volume.as_ref().map_or(Ok(()), |volume| volume.reset(pass))?;
+        let collisions = self.kit.append.collisions();
+        collisions.map_or(Ok(()), |stage| stage.reset(pass))?;
         pass.fill(self.kit.counters.view(), 0)
     }
 
@@ -93,6 +96,16 @@ impl WalkStages for PhotonStages<'_> {
             };
             recorder.pass("photon: medium", |pass| {
                 volume.record_medium(pass, bounce, &kit.scene, &kit.differentials, told)
+            })?;
+        }
+        if let Some(collisions) = kit.append.collisions() {
+            let told = CollisionPass {
+                key: self.key,
+                first_deposit: kit.stored.first_bounce,
+                last_bounce: kit.stored.last_bounce.min(BOUNCES_MAX),
+            };
+            recorder.pass("photon: medium", |pass| {
+                collisions.record(pass, bounce, &kit.scene, told)
             })?;
         }
         let push = photon_scatter::Push {
@@ -152,6 +165,8 @@ impl WalkStages for PhotonStages<'_> {
             .volume
             .as_ref()
             .map_or(Ok(()), |volume| volume.read_back(pass))?;
+        let collisions = self.kit.append.collisions();
+        collisions.map_or(Ok(()), |stage| stage.read_back(pass))?;
         pass.copy(self.kit.counters.view(), self.kit.counters_readback.view())
     }
 }

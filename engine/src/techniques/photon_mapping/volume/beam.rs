@@ -1,17 +1,25 @@
 //! What eye paths see of a volume map along their ways through media: the first part of the stage between arrival and scattering, in scenes with media.
 //!
 //! Rays ask by themselves or a subgroup's together, at every place of a wave or from a queue of those that do (B. Fabianowski, "Interactive Manycore Photon
-//! Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4): each one's sum has the order of the map's leaves, and the same bits.
+//! Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4): each one's sum has the order of the map's leaves, and the same bits. So it has where one kernel finds a ray's hit, its way
+//! and what is seen along it.
 
 use std::sync::OnceLock;
 
 use super::VolumeEstimate;
 use super::map::EventMap;
 use super::plane_rays::PlaneRays;
+use super::transmittance::VolumeTransmittance;
+use super::ways::BeamLength;
+use crate::accel::DeviceTraversal;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS, QUEUE_SLOTS};
+use crate::gpu::shaders::constants::{
+    LOBE_VOLUME, NO_MEDIUM, PATH_SET_DEAD, PATH_SET_STATE_BITS, QUEUE_SLOTS, WALK_GROUP, WAY_STEPS,
+};
 use crate::gpu::shaders::sets::{PhotonBeamSet, WaveSet};
-use crate::gpu::shaders::techniques::photon_mapping::{photon_beam, photon_beam_packet, photon_beam_ways};
+use crate::gpu::shaders::techniques::photon_mapping::{
+    photon_beam, photon_beam_fused, photon_beam_packet, photon_beam_ways,
+};
 use crate::gpu::shaders::types::{AskSettings, BeamWay};
 use crate::gpu::{
     Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, wide_counter,
@@ -19,13 +27,17 @@ use crate::gpu::{
 use crate::techniques::photon_mapping::gather::{GatherCounts, RayFetches};
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
 use crate::techniques::photon_mapping::queue::{AskSpec, Queue, QueueMemory};
-use crate::techniques::photon_mapping::settings::{MapQuery, PhotonSettings};
+use crate::techniques::photon_mapping::settings::{MapQuery, MapStages, PhotonSettings};
 use crate::transport::{GpuScene, PathSet};
-use crate::walk::{Places, WalkKey, stage_barrier};
+use crate::walk::{Places, RAY_QUOTA, WalkKey, default_slots, ray_quota, stage_barrier, work_least};
 use crate::{Error, Result};
 
 /// Nodes and events of a query, at most: beside a walk through a grid, its loops stay below [`SOFTWARE_LOOP_CAP`](crate::gpu::SOFTWARE_LOOP_CAP).
 const BEAM_QUOTA: u32 = 32_768;
+/// The same where the kernel has found the ray's hit before, whose lanes may take turns as those of walks do; the stages ask for the rest.
+const FUSED_QUOTA: u32 = 12_288;
+/// Bytes of the steps of a walk through a grid, or of its table.
+const STEPS_BYTES: usize = WAY_STEPS as usize * size_of::<[f32; 4]>();
 
 type Counters = photon_beam::BeamCounters;
 
@@ -40,12 +52,16 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     gpu: Gpu,
     query: Query,
     queue: Queue,
+    /// Finds hits of rays, too, in place of the walker's stage.
+    fused: Option<ComputePipeline<photon_beam_fused::Kernel>>,
     /// Finds the ways before the queue is filled; without one queries do.
     way_finder: Option<ComputePipeline<photon_beam_ways::Kernel>>,
     /// For places that a quota stopped: made when it is first needed.
     linear: (Box<photon_beam::Spec>, OnceLock<ComputePipeline<photon_beam::Kernel>>),
     ways: Buffer,
     asked: Buffer,
+    /// Of ways through grids, what is left of light along them.
+    steps: Buffer,
     /// Only where the map has planes.
     planes: Option<PlaneRays>,
     counters: Buffer,
@@ -90,7 +106,7 @@ impl Beam {
     /// For up to `slots` eye paths at once, with a queue in the memory `queues`.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`Error::OutOfMemory`], [`Error::Setting`] for fused stages over a kd-tree, and as [`ray_quota`].
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
@@ -113,7 +129,14 @@ impl Beam {
             of_rays: true,
         };
         let queue = Queue::new(gpu, scene, queues, queue)?;
-        // Both entry points have the same constants.
+        let tabulates = settings.volume_transmittance == VolumeTransmittance::Table;
+        let (fuses, traversal) = (settings.stages == MapStages::Fused, scene.index_traversal());
+        if fuses && matches!(traversal, DeviceTraversal::Kd { .. }) {
+            // A ray that it stops may go on at any number, and so at one that says how far a place is (PLACE_RAY_ENDED).
+            let cause = "cannot go through a kd-tree: take another ray index, or \"stream\"";
+            return Err(Error::setting("stages", "fused", cause));
+        }
+        // All entry points have the same constants.
         macro_rules! spec {
             ($shader:ident, $queue:expr, $linear:expr) => {
                 $shader::Spec {
@@ -124,6 +147,8 @@ impl Beam {
                     has_homogeneous: profile.media.homogeneous,
                     sampler_kind: settings.sampler as u32,
                     profile: settings.profile as u32,
+                    tabulates,
+                    short_ways: settings.volume_beams == BeamLength::Short,
                     marches: settings.volume == VolumeEstimate::March,
                     beams: settings.volume.stores_ways(),
                     planes: settings.volume.stores_planes(),
@@ -135,10 +160,26 @@ impl Beam {
                     has_classes: classes.is_some(),
                     queue: $queue,
                     linear: $linear,
+                    after_fused: fuses,
                     ..Default::default()
                 }
             };
         }
+        let has_alpha = profile.has_alpha();
+        let fused = || {
+            let spec = photon_beam_fused::Spec {
+                has_alpha,
+                // Attributes are read for alpha alone.
+                has_textures: has_alpha && profile.has_textures,
+                has_vertex_colors: has_alpha && profile.has_vertex_colors,
+                index_quota: ray_quota(gpu, scene, RAY_QUOTA)?,
+                index_kind: traversal.kind(),
+                work_least: work_least(gpu.caps().kind),
+                compact_quota: settings.query_quota.min(FUSED_QUOTA),
+                ..spec!(photon_beam_fused, QUEUE_SLOTS, false)
+            };
+            traversal.pipeline::<photon_beam_fused::Kernel>(gpu, &spec)
+        };
         let query = match settings.query {
             MapQuery::Single => Query::Single(gpu.compute_pipeline(&spec!(photon_beam, queue.kind(), false))?),
             MapQuery::Packet => Query::Packet(gpu.compute_pipeline(&spec!(photon_beam_packet, queue.kind(), false))?),
@@ -150,10 +191,11 @@ impl Beam {
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             sampler_kind: settings.sampler as u32,
+            tabulates,
             has_classes: classes.is_some(),
             ..Default::default()
         };
-        let asked = if profile.media.heterogeneous { slots } else { 1 };
+        let in_grids = if profile.media.heterogeneous { slots } else { 1 };
         let work = |name: &str, bytes: usize, count: u32| {
             gpu.buffer(&BufferDesc::storage(
                 name,
@@ -170,6 +212,7 @@ impl Beam {
         Ok(Self {
             gpu: gpu.clone(),
             query,
+            fused: fuses.then(fused).transpose()?,
             way_finder: queue
                 .collects()
                 .then(|| gpu.compute_pipeline::<photon_beam_ways::Kernel>(&way_finder))
@@ -177,7 +220,8 @@ impl Beam {
             queue,
             linear: (Box::new(spec!(photon_beam, QUEUE_SLOTS, true)), OnceLock::new()),
             ways: work("beam ways", size_of::<BeamWay>(), slots)?,
-            asked: work("beam asked", size_of::<f32>(), asked)?,
+            asked: work("beam asked", size_of::<f32>(), in_grids)?,
+            steps: work("beam steps", STEPS_BYTES, in_grids)?,
             planes: settings
                 .volume
                 .stores_planes()
@@ -199,6 +243,7 @@ impl Beam {
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all: Vec<PipelineInfo> = self.way_finder.iter().map(ComputePipeline::info).collect();
         all.extend(self.queue.pipelines());
+        all.extend(self.fused.iter().map(ComputePipeline::info));
         all.push(match &self.query {
             Query::Single(kernel) => kernel.info(),
             Query::Packet(kernel) => kernel.info(),
@@ -250,6 +295,7 @@ impl BeamStage<'_> {
             beam_counters: counters.view(),
             photon_beam_ways: self.beam.ways.view(),
             photon_beam_asked: self.beam.asked.view(),
+            photon_way_steps: self.beam.steps.view(),
             photon_plane_rays: planes.as_ref().map_or(counters.view(), PlaneRays::rays),
             gather_head: queue.gather_head,
             beam_places: queue.gather_places,
@@ -321,6 +367,36 @@ impl BeamStage<'_> {
         })
     }
 
+    /// Whether one kernel finds the hits of rays and asks along them.
+    pub fn finds_hits(&self) -> bool {
+        self.beam.fused.is_some()
+    }
+
+    /// Records that kernel at all places.
+    ///
+    /// # Errors
+    /// Those of recording, and [`Error::Internal`] where there is none.
+    pub fn record_with_hits(
+        &self,
+        recorder: &mut Recorder,
+        scene: &GpuScene,
+        wave: &WaveSet<'_>,
+        places: Places<'_>,
+    ) -> Result<()> {
+        let fused = self.beam.fused.as_ref().ok_or_else(|| Error::Internal {
+            what: "volume map".into(),
+            fault: "has no kernel that finds hits".into(),
+        })?;
+        let (set, index, of_scene, media) = (self.set(), scene.index_set(), scene.scene_set(), scene.media_set());
+        let sets: [&dyn BindingSet<'_>; 5] = [wave, &index, &of_scene, &media, &set];
+        let push = self.push(scene, places.key);
+        recorder.pass("photon: rays and beams", |pass| {
+            pass.dispatch_indirect(fused, &sets, &bytemuck::cast(push), places.items)?;
+            stage_barrier(pass);
+            Ok(())
+        })
+    }
+
     /// The rays that eye paths send along the flights of planes, behind queries.
     pub fn planes(&self) -> Option<&PlaneRays> {
         self.beam.planes.as_ref()
@@ -361,6 +437,16 @@ impl BeamStage<'_> {
         stage_barrier(pass);
         Ok(())
     }
+}
+
+/// Eye paths under way at once, at most, so that what rays through grids keep can be bound; 0 leaves their number as it is.
+pub(in crate::techniques::photon_mapping) fn paths_in_flight(gpu: &Gpu, scene: &GpuScene) -> u32 {
+    let most = gpu.caps().max_storage_buffer_range / STEPS_BYTES as u64;
+    if !scene.profile().media.heterogeneous || most >= u64::from(default_slots(gpu)) {
+        return 0;
+    }
+    let most = most as u32;
+    (most - most % WALK_GROUP).max(WALK_GROUP)
 }
 
 /// The states of eye paths that may go on by a lobe, a bit each.

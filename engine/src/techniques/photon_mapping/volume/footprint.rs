@@ -5,6 +5,7 @@
 //! density of collisions. Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.2, §7.3.1 and §7.3.2, where
 //! the unit of lengths is a metre. Guarantee: no length is compared with a constant, only with the unit length.
 
+use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::shaders::constants::{FOOTPRINT_PASSED_MIN, LOG_SERIES_BELOW};
 use crate::transport::differentials::{Differentials, reemission_differentials, roulette_differentials};
 use glam::DVec3;
@@ -86,6 +87,75 @@ pub fn scattered_in_medium(
     };
     reemission_differentials(side, direction, phase, 4.0 * PI)
 }
+
+/// Rows of the catalogue.
+pub(crate) const ROWS: &[Row] = &[
+    Row {
+        id: "PM-PD-9",
+        name: "photon differentials through a medium, as far as a surface",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "No less than a ten-thousandth counts as having passed; in grids that share is reckoned from the bounds of the density.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.2.1.1")],
+        shaders: &["shaders/techniques/photon_mapping/photon_footprint.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::volumes_are_reciprocals_of_the_density_of_collisions",
+            "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
+        ],
+        settings: &["volume_kernel"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-10",
+        name: "photon differentials as far as a collision: a third parameter, and a volume",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "The third vector lies along the way, so that a product of the other two is all that is kept; its length is the reciprocal of the density with which photons collide there.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.2.1.2")],
+        shaders: &["shaders/techniques/photon_mapping/photon_footprint.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::volumes_are_reciprocals_of_the_density_of_collisions",
+            "tests/tests/photon/volume.rs::kernels_from_footprints_hold_as_many_collisions_as_they_should",
+            "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
+        ],
+        settings: &["volume_kernel"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-PD-11",
+        name: "photon differentials after scattering in a medium: as from a point behind, so far that the expected volume stays, for every phase function",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Where the footprint came from is forgotten, and so is its form.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.2.2 and §7.2.3")],
+        shaders: &[
+            "shaders/techniques/photon_mapping/photon_footprint.glsl",
+            "shaders/techniques/photon_mapping/photon_medium.comp",
+        ],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::scattering_keeps_the_expected_volume",
+            "tests/tests/photon/volume.rs::kernels_from_footprints_agree_with_the_path_tracer",
+            "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
+        ],
+        settings: &["volume_kernel"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-DE-8",
+        name: "dampening of kernels in media by a logarithm",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "The strength that errs least depends on the scene and on how often photons were scattered; the unit is a ninth of the scene's diagonal where none is given, not a metre.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.3.2")],
+        bias: Some(Bias::Consistent(
+            "kernels blur events, the less the stronger they are dampened, until they have shrunk",
+        )),
+        shaders: &["shaders/techniques/photon_mapping/photon_footprint.glsl"],
+        tests: &[
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::dampening_has_its_published_values",
+            "engine/src/techniques/photon_mapping/volume/footprint.rs::scaling_the_scene_and_the_unit_scales_the_kernel",
+            "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
+        ],
+        settings: &["volume_dampening", "unit_length"],
+        ..Row::of(file!())
+    },
+];
 
 #[cfg(test)]
 mod tests {

@@ -6,7 +6,7 @@
 
 use super::event::{EventWords, MEDIUM_WORD, event_box, set_event_radius, unpack_beam, unpack_event};
 use super::footprint::EventKernelSettings;
-use super::neighbor::{NEIGHBORS, neighbor_radii};
+use super::neighbor::neighbor_radii;
 use super::plane::plane_corners;
 use super::{VolumeEstimate, VolumeKernel};
 use crate::accel::Aabb;
@@ -50,8 +50,8 @@ pub(in crate::techniques::photon_mapping) struct EventMaps {
     or_host: bool,
     /// What records are.
     estimate: VolumeEstimate,
-    /// Kernels are as wide as neighbours are far, which the host finds.
-    by_neighbors: bool,
+    /// Kernels are as wide as this neighbour is far, which the host finds.
+    neighbors: Option<usize>,
 }
 
 struct DeviceEventMaps {
@@ -74,6 +74,7 @@ impl EventMaps {
             estimate.stores_points(),
         );
         let by_neighbors = settings.volume_kernel == VolumeKernel::Neighbor;
+        let neighbors = by_neighbors.then_some(settings.volume_neighbors as usize);
         let device = match build {
             _ if by_neighbors => None,
             MapBuild::Host => None,
@@ -92,7 +93,7 @@ impl EventMaps {
             device,
             or_host: build == MapBuild::Auto,
             estimate,
-            by_neighbors,
+            neighbors,
         })
     }
 
@@ -144,9 +145,9 @@ impl EventMaps {
         shrunk: f64,
     ) -> Result<Vec<EventWords>> {
         let mut words: Vec<EventWords> = self.gpu.read(events.buffer().view(), count as usize)?;
-        if self.by_neighbors {
+        if let Some(neighbors) = self.neighbors {
             let places: Vec<_> = words.iter().map(unpack_event).map(|e| (e.position, e.medium)).collect();
-            let radii = neighbor_radii(&places, NEIGHBORS, (kernel.length_max / shrunk) as f32)?;
+            let radii = neighbor_radii(&places, neighbors, (kernel.length_max / shrunk) as f32)?;
             for (words, radius) in words.iter_mut().zip(radii) {
                 let shrunk = f64::from(radius) * shrunk;
                 set_event_radius(words, shrunk.max(kernel.length_min) as f32);

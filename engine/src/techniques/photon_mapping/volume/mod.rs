@@ -23,8 +23,10 @@ pub mod neighbor;
 pub mod plane;
 mod plane_rays;
 mod trace;
+pub mod transmittance;
+pub mod ways;
 
-pub(super) use beam::{Beam, BeamAsk, BeamStage};
+pub(super) use beam::{Beam, BeamAsk, BeamStage, paths_in_flight};
 pub(super) use map::{EventMap, EventMaps};
 pub(super) use plane_rays::SWEEPS_MAX;
 pub(super) use trace::{Room, VolumeOptions, VolumePass, VolumeTrace};
@@ -38,7 +40,7 @@ use crate::gpu::shaders::constants::{EVENT_QUARTERS, WIDE_QUARTERS};
 pub enum VolumeEstimate {
     /// The beam estimate: disks across the ray, one query for all of it.
     Ray,
-    /// Beams: ways of photons through homogeneous media as far as the next surface, each seen where the ray passes it.
+    /// Beams: ways of photons through homogeneous media, as far as the next surface or by chance ([`BeamLength`](ways::BeamLength)), each seen where the ray passes it.
     Beams,
     /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else.
     Planes,
@@ -115,7 +117,7 @@ pub enum VolumeKernel {
     Fixed,
     /// As the photon's footprint is.
     Footprint,
-    /// As far as the [`NEIGHBORS`](neighbor::NEIGHBORS)-th nearest of the other events in its medium.
+    /// As far as the nearest of the other events in its medium of which the setting `volume_neighbors` says the number.
     Neighbor,
 }
 
@@ -140,7 +142,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "PM-VOL-7",
         name: "beam estimate: one query of the volume map per ray, in corrected units (PM-VOL-6 are the original ones)",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Single scattering is the eye paths' by default; in a grid light from an event passes by chance, which costs noise.",
+        limits: "Single scattering is the eye paths' by default; in a grid the transmittance along a ray is an estimate, the same for all that the ray sees.",
         sources: &[
             sources::FABIANOWSKI_2011.at("§7.1"),
             sources::JAROSZ_2008.whole(),
@@ -175,6 +177,9 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume_truths.rs::slabs_have_the_radiance_of_the_tables",
             "tests/tests/photon/volume_truths.rs::rays_past_a_source_have_the_exact_multiple_scattering",
             "tests/tests/photon/volume_truths.rs::furnaces_stay_even_with_lossless_media_inside",
+            "tests/tests/photon/volume_extremes.rs::collisions_along_rays_stay_finite",
+            "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_collisions_along_rays",
+            "tests/tests/photon/volume_extremes.rs::narrow_kernels_err_by_less_than_a_hundredth",
         ],
         settings: &["volume", "volume_radius", "reduction"],
         ..Row::of(file!())
@@ -197,6 +202,9 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume_kernels.rs::beams_have_no_kernels_of_their_own",
             "tests/tests/photon/volume_queues.rs::beams_are_the_same_in_every_form_on_any_number_of_threads",
             "tests/tests/photon/volume_truths.rs::slabs_have_the_radiance_of_the_tables",
+            "tests/tests/photon/volume_extremes.rs::beams_stay_finite",
+            "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_beams",
+            "tests/tests/photon/volume_extremes.rs::narrow_kernels_err_by_less_than_a_hundredth",
             "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
         ],
         settings: &["volume"],
@@ -234,6 +242,9 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/shared_paths.rs::shares_have_the_same_bits_however_it_is_done",
             "tests/tests/photon/shared_paths.rs::eye_paths_go_on_beside_collisions_and_ways_alone",
             "tests/tests/photon/volume_truths.rs::rays_past_a_source_have_the_exact_multiple_scattering",
+            "tests/tests/photon/volume_extremes.rs::collisions_and_beams_together_stay_finite",
+            "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_collisions_and_beams_together",
+            "tests/tests/photon/volume_extremes.rs::narrow_kernels_err_by_less_than_a_hundredth",
             "tests/tests/twins/photons.rs::beams_agree_with_their_twins",
             "tests/tests/twins/photons.rs::shares_with_eye_paths_agree_with_their_twins",
         ],
@@ -269,6 +280,9 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/planes.rs::planes_of_thin_bodies_are_no_larger_than_these",
             "tests/tests/photon/planes.rs::what_is_chosen_alone_has_planes",
             "tests/tests/photon/planes.rs::errors_of_planes_fall_with_the_root_of_passes",
+            "tests/tests/photon/volume_extremes.rs::planes_stay_finite",
+            "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_planes",
+            "tests/tests/photon/volume_extremes.rs::planes_agree_with_the_path_tracer_where_phase_functions_are_narrow",
             "tests/tests/twins/photons.rs::planes_agree_with_their_twins",
         ],
         settings: &["volume"],
@@ -289,6 +303,9 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/volume/event.rs::kernels_integrate_to_one_over_space_and_marches_to_a_disk",
             "tests/tests/photon/volume_queues.rs::marches_are_the_same_in_every_form_on_any_number_of_threads",
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
+            "tests/tests/photon/volume_extremes.rs::marches_stay_finite",
+            "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_marches",
+            "tests/tests/photon/volume_extremes.rs::narrow_kernels_err_by_less_than_a_hundredth",
         ],
         settings: &["volume"],
         ..Row::of(file!())
@@ -309,10 +326,15 @@ pub(crate) const ROWS: &[Row] = &[
         ],
         tests: &[
             "tests/tests/photon/volume.rs::photons_in_media_are_kept_to_the_count",
+            "tests/tests/photon/volume_counts.rs::photons_are_kept_to_the_count_by_every_estimate",
+            "tests/tests/photon/volume_counts.rs::photons_are_kept_to_the_count_whatever_becomes_of_them",
             "tests/tests/photon/volume.rs::collisions_are_as_many_as_the_albedo_says",
             "tests/tests/photon/volume_truths.rs::collisions_about_a_source_are_those_of_the_exact_fluence",
             "tests/tests/photon/volume.rs::scenes_without_media_have_nothing_of_it",
+            "tests/tests/photon/without.rs::without_media_there_is_no_pass_byte_or_branch_of_them_and_the_same_bits",
             "tests/tests/photon/volume.rs::threads_never_show_in_media",
+            "tests/tests/photon/volume.rs::room_for_events_grows",
+            "tests/tests/photon/volume.rs::collisions_beyond_a_buffer_are_refused_by_the_name_of_its_limit",
         ],
         settings: &["photons"],
         ..Row::of(file!())
@@ -345,7 +367,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-VOL-8",
-        name: "kernels in media as wide as the 85th neighbour is far",
+        name: "kernels in media as wide as a neighbour is far, the 85th by default",
         role: Role::PartOf("PM-SYS-1"),
         limits: "The host finds neighbours, which takes longer than all the rest of a pass; a baseline for kernels from footprints.",
         sources: &[
@@ -359,7 +381,44 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/volume_kernels.rs::kernels_by_neighbours_hold_so_many",
             "tests/tests/photon/volume_kernels.rs::rays_see_the_kernels_that_events_have",
         ],
-        settings: &["volume_kernel"],
+        settings: &["volume_kernel", "volume_neighbors"],
         ..Row::of(file!())
+    },
+    Row {
+        id: "BG-6",
+        name: "beam estimate with kernels by neighbours, as a baseline of light in media",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "A million collisions and 117 neighbours, as the source has them, are settings; the host finds neighbours.",
+        sources: &[
+            sources::ENGELHARDT_2013.at("4.6 and 10.4"),
+            sources::JAROSZ_2008.whole(),
+        ],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/photon_beam.comp"],
+        tests: &[
+            "tests/tests/photon/volume_kernels.rs::kernels_by_neighbours_hold_so_many",
+            "tests/tests/photon/volume_kernels.rs::rays_see_the_kernels_that_events_have",
+            "tests/tests/photon/volume.rs::airlight_has_its_six_constants",
+        ],
+        settings: &["volume", "volume_kernel", "volume_neighbors", "photons"],
+        ..Row::of(file!())
+    },
+    Row {
+        id: "PM-SYS-2",
+        name: "photon mapping of participating media as a whole: photons through media, kernels from footprints, a compact map, queries along rays, a moving light",
+        role: Role::PartOf("PM-SYS-1"),
+        limits: "Photons, map and kernels are made anew for each frame; the source's queries by packets are a setting.",
+        sources: &[sources::FABIANOWSKI_2011.at("§7.5")],
+        bias: Some(BIAS),
+        shaders: &["shaders/techniques/photon_mapping/"],
+        tests: &[
+            "tests/tests/photon/volume.rs::kernels_from_footprints_agree_with_the_path_tracer",
+            "tests/tests/photon/volume.rs::grids_agree_with_the_path_tracer",
+            "tests/tests/photon/volume_queues.rs::every_queue_and_packets_give_the_same_picture_through_media",
+            "tests/tests/photon/without.rs::without_diffuse_surfaces_there_is_no_map_of_them_and_the_same_bits",
+            "tests/tests/photon/without.rs::without_media_there_is_no_pass_byte_or_branch_of_them_and_the_same_bits",
+        ],
+        settings: &["volume", "volume_kernel", "queue", "query"],
+        ..Row::of("engine/src/techniques/photon_mapping/mapper.rs")
     },
 ];

@@ -1,7 +1,7 @@
-//! Kernels in media by neighbours: as wide as the 85th of the other events of a medium is far.
+//! Kernels in media by neighbours: as wide as the n-th of the other events of a medium is far.
 //!
 //! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §3.4.2.4 and §7.3.4, whose original extrapolates from fewer
-//! neighbours; here they are exact. Guarantee: radii are those of all pairs of events by the same arithmetic, on any number of threads.
+//! neighbours to the 85th; here they are exact. Guarantee: radii are those of all pairs of events by the same arithmetic, on any number of threads.
 
 use crate::Result;
 use crate::accel::photon_map::complete_bvh::QueryCounters;
@@ -10,9 +10,6 @@ use crate::accel::yardstick::point_tree::PointTree;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-
-/// Which of the other events says how wide an event's kernel is.
-pub const NEIGHBORS: usize = 85;
 
 /// Distance from each event, a place and the number of its medium, to the `neighbors`-th nearest other event of the same medium, m; `greatest` where there are not so
 /// many within that.

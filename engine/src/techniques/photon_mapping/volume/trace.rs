@@ -7,6 +7,7 @@ use super::VolumeEstimate;
 use super::event::{EventWords, MEDIUM_WORD};
 use super::footprint::EventKernelSettings;
 use super::plane::WideWords;
+use super::ways::BeamLength;
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{EVENT_MEDIUM_MASK, NO_MEDIUM};
@@ -16,6 +17,7 @@ use crate::gpu::shaders::types;
 use crate::gpu::{Access, Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo, TexelView};
 use crate::kernels::{Count, Scan, ScanBuffers, ScanOptions};
 use crate::techniques::photon_mapping::PhotonPlan;
+use crate::techniques::photon_mapping::tracer::{records_of_device, records_within_limit};
 use crate::transport::GpuScene;
 use crate::walk::{Bounce, WalkKey, stage_barrier};
 use crate::{Error, Result};
@@ -55,6 +57,8 @@ pub(in crate::techniques::photon_mapping) struct VolumeOptions {
     pub has_classes: bool,
     /// What is stored.
     pub estimate: VolumeEstimate,
+    /// Of ways.
+    pub beams: BeamLength,
 }
 
 /// Where records of a wave begin, and how many there is room for.
@@ -122,6 +126,7 @@ impl VolumeTrace {
             has_differentials: plan.follows_footprints,
             has_classes: options.has_classes,
             tells_lights: plan.tells_lights,
+            short_ways: options.beams == BeamLength::Short,
             stores_ways,
             stores_planes,
             stores_points,
@@ -131,7 +136,7 @@ impl VolumeTrace {
         let words = |name: &str| work(name, u64::from(slots) * size_of::<u32>() as u64);
         let scan = Scan::new(gpu, ScanOptions::default())?;
         let bytes = size_of::<Counters>() as u64;
-        let capacity = (u64::from(plan.photons) * EVENTS_PER_PHOTON).min(events_of_device(gpu, quarters)) as u32;
+        let capacity = (u64::from(plan.photons) * EVENTS_PER_PHOTON).min(records_of_device(gpu, quarters)) as u32;
         Ok(Self {
             medium: gpu.compute_pipeline(&medium)?,
             flags: gpu.compute_pipeline(&photon_volume_flags::Spec {
@@ -321,7 +326,7 @@ impl VolumeTrace {
     /// # Errors
     /// [`Error::Overflow`] for more collisions or whole ways than the device can hold, [`Error::OutOfMemory`].
     pub fn grow(&mut self, gpu: &Gpu, needed: u32) -> Result<()> {
-        let most = events_of_device(gpu, self.quarters);
+        let most = records_of_device(gpu, self.quarters);
         let mut needed = needed;
         if u64::from(needed) > most && self.has_pieces && self.pieces_most > 1 {
             self.pieces_most /= 2;
@@ -330,7 +335,7 @@ impl VolumeTrace {
         if u64::from(needed) > most {
             return Err(Error::Overflow {
                 kernel: "photon_volume_append".into(),
-                what: "photon events".into(),
+                what: records_within_limit(gpu, "photon events"),
                 needed: needed.into(),
                 capacity: most,
                 instead: "trace fewer photons per pass: setting `photons`".into(),
@@ -341,13 +346,6 @@ impl VolumeTrace {
         self.capacity = capacity;
         Ok(())
     }
-}
-
-/// Records of so many quarters that a buffer of the device can hold: 2²² of two where one has 128 MiB.
-fn events_of_device(gpu: &Gpu, of_record: u32) -> u64 {
-    let caps = gpu.caps();
-    let quarters = caps.max_texel_buffer_elements.min(caps.max_storage_buffer_range / 16);
-    (quarters / u64::from(of_record)).min(u64::from(u32::MAX / 2))
 }
 
 fn event_texels(gpu: &Gpu, events: u32, of_record: u32) -> Result<TexelView> {

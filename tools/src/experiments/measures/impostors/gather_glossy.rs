@@ -24,9 +24,9 @@ const SIDES: [u32; 4] = [2, 4, 8, 16];
 pub const CLASSICAL_SIDE: u32 = 32;
 const PICTURE: &str = "glossy.png";
 /// Of the picture: pixels along a side of a tile, and directions of its oracle along the sides of faces.
-const TILE: (u32, u32) = (64, 48);
+pub const TILE: (u32, u32) = (64, 48);
 /// From where spheres are seen.
-const FROM: DVec3 = DVec3::new(-0.6, 0.2, 1.0);
+pub const FROM: DVec3 = DVec3::new(-0.6, 0.2, 1.0);
 
 rows! {
     /// A gather at a place.

@@ -3,6 +3,7 @@
 //! Oracle: sums over directions of what is seen in them from the points.
 
 use clerestory::Result;
+use clerestory::film::png::Rgb8;
 use clerestory::gpu::Gpu;
 use clerestory::maps::Parametrization;
 use clerestory::maps::gather::lit_room::{LitRoom, relative_errors};
@@ -12,7 +13,8 @@ use clerestory::maps::impostor::room::BoxRoom;
 use clerestory::maps::impostor::{ImpostorImage, ImpostorRay, ImpostorSettings, SearchMethod};
 use glam::{DVec3, UVec2};
 
-use super::gather_glossy::{CLASSICAL_SIDE, at_the_maps_place};
+use super::gather_glossy::{CLASSICAL_SIDE, FROM, TILE, at_the_maps_place};
+use super::lit_spheres::{Lit, seen_in_lobes, sheet_of};
 use super::published_lobe;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, rows};
 use crate::experiments::measures::Context;
@@ -23,6 +25,9 @@ const TIMED_POINTS: u32 = 1 << 17;
 const TIMED_EXPONENT: f32 = 10.0;
 const TURNS: usize = 7;
 const EXPONENTS: [f32; 3] = [5.0, 10.0, 50.0];
+const PICTURE: &str = "terms.png";
+/// Gathers that the picture shows: texels along a face's side, and terms.
+const SHOWN: [(u32, Terms); 3] = [(4, Terms::Five), (4, Terms::All), (8, Terms::All)];
 /// The middle of the room, and near the patch.
 const PLACES: [DVec3; 2] = [DVec3::ZERO, DVec3::new(0.5, -0.3, 0.3)];
 /// Directions along the sides of the faces of a cube that the oracle sums over.
@@ -57,6 +62,8 @@ rows! {
 pub struct Found {
     errors: Vec<Row>,
     published: Vec<published_lobe::Row>,
+    #[serde(default)]
+    few: Vec<published_lobe::Few>,
     times: Vec<Time>,
 }
 
@@ -123,6 +130,48 @@ fn published(row: &Time) -> Option<f64> {
         (ALL, 8) => Some(6.0),
         _ => None,
     }
+}
+
+/// Glossy light of points on the device by terms of an exponent.
+fn gathered(
+    gpu: &Gpu,
+    lights: &GatherLights,
+    (terms, exponent): (Terms, f32),
+    points: &[GatherPoint],
+) -> Result<Vec<f64>> {
+    let settings = GatherSettings {
+        terms,
+        ..GatherSettings::default()
+    };
+    let found = Gather::new(gpu, lights, &settings, exponent)?.gather(points)?;
+    Ok(found.into_iter().map(|value| value.x).collect())
+}
+
+/// Glossy spheres at places: the oracle, the map at its place, five of 4² texels a face, all of them, and all of 8².
+fn picture(
+    gpu: &Gpu,
+    room: &LitRoom,
+    places: &[DVec3],
+    (still, lights): (&GatherLights, &[(u32, GatherLights)]),
+    (side, directions): (u32, u32),
+) -> Result<Rgb8> {
+    let exponent = TIMED_EXPONENT;
+    let views: Vec<_> = places.iter().map(|place| seen_in_lobes(*place, FROM, side)).collect();
+    let mut ways: Vec<Lit<'_>> = vec![
+        Box::new(move |points: &[GatherPoint]| Ok(room.glossy(points, f64::from(exponent), directions))),
+        Box::new(move |points: &[GatherPoint]| {
+            gathered(gpu, still, (Terms::All, exponent), &at_the_maps_place(points))
+        }),
+    ];
+    for (shown, terms) in SHOWN {
+        let Some((_, lights)) = lights.iter().find(|(side, _)| *side == shown) else {
+            continue;
+        };
+        ways.push(Box::new(move |points: &[GatherPoint]| {
+            gathered(gpu, lights, (terms, exponent), points)
+        }));
+    }
+    sheet_of(&views, &ways, side)
 }
 
 /// Times of gathers near the patch by lights of some texels a side, and of a look-up in their place.
@@ -205,17 +254,15 @@ impl Study for Found {
             .map(|side| Ok((*side, room.printed_lights(*side, SolidAngleForm::Disc)?)));
         let lights: Vec<_> = lights.collect::<Result<_>>()?;
         let still = room.printed_lights(CLASSICAL_SIDE, SolidAngleForm::Disc)?;
+        let places = context.first(&PLACES, 1);
+        let shown = picture(&gpu, &room, places, (&still, &lights), context.pick(TILE, (6, 8)))?;
+        context.picture(PICTURE, &shown);
         let name = |(place, exponent): &(DVec3, f32)| format!("{place}, exponent {exponent}");
         let errors = context.each(&cases, name, |(place, exponent)| {
             let points = LitRoom::points(*place, count);
             let exact = room.glossy(&points, f64::from(*exponent), directions);
-            let values = |lights: &GatherLights, terms: Terms, points: &[GatherPoint]| -> Result<Vec<f64>> {
-                let settings = GatherSettings {
-                    terms,
-                    ..GatherSettings::default()
-                };
-                let found = Gather::new(&gpu, lights, &settings, *exponent)?.gather(points)?;
-                Ok(found.into_iter().map(|value| value.x).collect())
+            let values = |lights: &GatherLights, terms: Terms, points: &[GatherPoint]| {
+                gathered(&gpu, lights, (terms, *exponent), points)
             };
             let classical = values(&still, Terms::All, &at_the_maps_place(&points))?;
             let [rms_of_classical, _] = relative_errors(&classical, &exact);
@@ -248,6 +295,7 @@ impl Study for Found {
         Ok(Self {
             errors,
             published: published_lobe::measure(context, &room)?,
+            few: published_lobe::measure_few(context, &room)?,
             times: times(context, &gpu, &lights)?,
         })
     }
@@ -256,20 +304,34 @@ impl Study for Found {
         let five = self.errors.iter().find(|row| {
             row.place == PLACES[0].to_string() && row.terms == SCALED && row.exponent == 10.0 && row.side == 4
         });
-        Findings::of(&self.errors, CRITERIA)
+        let findings = Findings::of(&self.errors, CRITERIA)
             .headline(
                 "bias of five scaled terms in the middle of the room, exponent 10, 4² texels a face (%)",
                 five.map(|row| Measured::exact(row.bias)),
             )
             .note(
                 "Points lie on spheres of radius 0.15, whose normals are the lobes' axes; lobes are normalised, and lights are as printed. The five terms are those of the greatest \
-                 reflectivity times solid angle; scaled ones are divided by their sum. What was published is of another lobe, and stands in a table of its own.",
+                 reflectivity times solid angle; scaled ones are divided by their sum. What was published is of another lobe, and stands in tables of its own.",
+            );
+        let findings = if self.few.is_empty() {
+            findings
+        } else {
+            findings.picture(
+                PICTURE,
+                "Glossy spheres of exponent 10 in the middle and near the patch; from the left sums over directions, the map at its place, five of 4² texels a face, all of them, and all of 8²",
             )
+        };
+        findings
             .and(Findings::of(&self.published, published_lobe::CRITERIA))
             .note(
                 "The published lobe is the cosine of the normal with the half vector to an eye, to the power of the exponent, without a norm. Nothing says where that eye is: it is put at (−0.8, 0.1, −0.7), that of \
                  the published rays to mirror spheres, and points are those that face it. Figures of exponents 5 and 10 are met \
                  from there within about a tenth; those of exponent 50 rest on few points, and differ by up to a third.",
+            )
+            .and(Findings::of(&self.few, published_lobe::OF_FEW))
+            .note(
+                "Five terms by the same lobe are those of the greatest reflectivity times solid angle, as they are, and scaled to the sum of all weights. Biases were published for 4² texels and exponent 10, \
+                 RMS errors of scaled terms for the middle of the room.",
             )
             .and(Findings::of(&self.times, OF_TIMES))
             .note(

@@ -78,6 +78,10 @@ pub struct Scenario {
     pub greatest: f32,
     /// Dampening of photons that were scattered once before, up to once, and once or twice, m.
     pub dampening: [f32; 3],
+    /// Collisions that it stores for the counts that follow.
+    pub events: u64,
+    /// Kernels that have the greatest radius, by the 85th neighbour and by footprints, %.
+    pub clamped: [f64; 2],
     /// Kernels about a ray by the 85th neighbour, and what footprints change of it, %.
     pub kernels: [f64; 2],
     /// Whether a mirror throws light into the medium, which no path from the eye finds where lamps have no area.
@@ -99,6 +103,8 @@ const RING: Scenario = Scenario {
     photons: 1 << 20,
     greatest: 1.0,
     dampening: [2.5, 2.5, 1.5],
+    events: 816_605,
+    clamped: [0.0; 2],
     kernels: [766.87, 37.95],
     has_mirror: true,
 };
@@ -112,6 +118,8 @@ const ATRIUM: Scenario = Scenario {
     },
     greatest: 2.0,
     dampening: [6.0, 3.0, 3.0],
+    events: 255_811,
+    clamped: [0.11, 0.0],
     kernels: [1124.68, -15.21],
     has_mirror: false,
     ..RING
@@ -127,6 +135,8 @@ const CATHEDRAL: Scenario = Scenario {
     photons: 1 << 18,
     greatest: 3.0,
     dampening: [5.0, 3.0, 2.5],
+    events: 362_540,
+    clamped: [0.18, 0.0],
     kernels: [1290.03, -7.75],
     has_mirror: false,
 };
@@ -142,6 +152,7 @@ pub static SCENARIOS: [Scenario; 9] = [
             ..RING.medium
         },
         dampening: [10.0, 10.0, 2.5],
+        events: 894_416,
         kernels: [645.28, 18.56],
         ..RING
     },
@@ -154,6 +165,7 @@ pub static SCENARIOS: [Scenario; 9] = [
             ..RING.medium
         },
         dampening: [10.0, 10.0, 2.5],
+        events: 818_157,
         kernels: [599.85, 11.59],
         ..RING
     },
@@ -165,6 +177,7 @@ pub static SCENARIOS: [Scenario; 9] = [
             sigma_a: COLOURED,
             ..ATRIUM.medium
         },
+        events: 269_959,
         kernels: [1145.64, -12.23],
         ..ATRIUM
     },
@@ -177,6 +190,8 @@ pub static SCENARIOS: [Scenario; 9] = [
             ..ATRIUM.medium
         },
         dampening: [10.0, 5.0, 5.0],
+        events: 258_533,
+        clamped: [0.12, 0.02],
         kernels: [728.14, 22.30],
         ..ATRIUM
     },
@@ -188,6 +203,8 @@ pub static SCENARIOS: [Scenario; 9] = [
             ..CATHEDRAL.medium
         },
         dampening: [7.0, 4.0, 3.0],
+        events: 355_852,
+        clamped: [0.19, 0.0],
         kernels: [1298.92, 3.97],
         ..CATHEDRAL
     },
@@ -199,6 +216,7 @@ pub static SCENARIOS: [Scenario; 9] = [
             k: -0.5,
             ..CATHEDRAL.medium
         },
+        events: 369_746,
         kernels: [1287.44, -3.51],
         ..CATHEDRAL
     },

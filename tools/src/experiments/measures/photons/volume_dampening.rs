@@ -29,9 +29,9 @@ const FULL: Form = Form {
     size: [32, 24],
     share: 8,
     turns: 5,
-    path_spp: 2048,
-    photons: 1 << 17,
-    passes: 96,
+    path_spp: 1024,
+    photons: 1 << 16,
+    passes: 64,
 };
 const SMOKE: Form = Form {
     size: [8, 6],
@@ -41,8 +41,20 @@ const SMOKE: Form = Form {
     photons: 1 << 10,
     passes: 2,
 };
-/// A medium that scatters 98 % of what collides, and one that scatters a quarter; a smoke run has these alone.
+/// A medium that scatters 98 % of what collides, and one that scatters a quarter.
 const DENSER: [&str; 2] = ["ring, point light", "atrium, neutral"];
+/// Scenes of which the second wants a weaker dampening, as the source has it, and what they differ in.
+const WEAKER: [(&str, [&str; 2]); 3] = [
+    ("a point light, with a spot", ["ring, point light", "ring, spot"]),
+    (
+        "an even medium, with an uneven one",
+        ["atrium, coloured", "atrium, uneven"],
+    ),
+    (
+        "even scattering, with forward scattering",
+        ["cathedral, k = 0", "cathedral, k = 0.5"],
+    ),
+];
 
 /// Sizes of a run.
 #[derive(Clone, Copy)]
@@ -121,15 +133,21 @@ const OF_TREND: &[Criterion<Trend>] = &[
         |row: &Trend| (&row.stronger).into(),
     )
     .among(|row| row.compared == BY_MEDIUM),
+    Criterion::each(
+        "a spot, an uneven medium and forward scattering want a dampening as weak or weaker: the others' reciprocal, less theirs (1/m)",
+        Bound::AtLeast(0.0),
+        |row: &Trend| (&row.stronger).into(),
+    )
+    .among(|row| WEAKER.iter().any(|(compared, _)| row.compared == *compared)),
 ];
 
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let is_in = |scenario: &&Scenario| !context.smoke || DENSER.contains(&scenario.name);
-        let scenarios = SCENARIOS.iter().filter(is_in);
-        let cases: Vec<(&Scenario, Depths)> = scenarios
+        let cases: Vec<(&Scenario, Depths)> = SCENARIOS
+            .iter()
             .flat_map(|scenario| Depths::ALL.map(|depths| (scenario, depths)))
+            .filter(|(scenario, depths)| !context.smoke || is_of_smoke_run(scenario, *depths))
             .collect();
         let name = |(scenario, depths): &(&Scenario, Depths)| format!("{}, {}", scenario.name, depths.words());
         let errors = context.each_kept(&gpu, &cases, name, |(scenario, depths)| {
@@ -157,6 +175,17 @@ impl Study for Found {
             ))
             .and(Findings::of(&trends, OF_TREND))
             .and(Findings::of(&self.errors, &[]).long())
+    }
+}
+
+/// One set of photons of the scenes that are compared, and another of one of them.
+fn is_of_smoke_run(scenario: &Scenario, depths: Depths) -> bool {
+    let mut weaker = WEAKER.iter().flat_map(|(_, scenes)| scenes);
+    let is_compared = DENSER.contains(&scenario.name) || weaker.any(|name| *name == scenario.name);
+    match depths {
+        Depths::One => is_compared,
+        Depths::OneAndTwo => scenario.name == DENSER[0],
+        Depths::UpToOne => false,
     }
 }
 
@@ -269,7 +298,7 @@ fn strength(row: &Row) -> f64 {
     if row.dampening == 0.0 { 0.0 } else { 1.0 / row.dampening }
 }
 
-/// The deeper set of each scene beside the other, and the denser medium of each set.
+/// The deeper set of each scene beside the other, and of each set the denser medium, and what the source dampens less.
 fn trends(least: &[Least]) -> Vec<Trend> {
     let of = |scene: &str, depths: Depths| {
         least
@@ -297,7 +326,18 @@ fn trends(least: &[Least]) -> Vec<Trend> {
             thin,
         )
     });
-    by_depth.chain(by_medium).collect()
+    let by_scene = WEAKER.iter().flat_map(|(compared, scenes)| {
+        Depths::ALL.into_iter().filter_map(move |depths| {
+            let [stronger, weaker] = scenes.map(|scene| of(scene, depths));
+            trend(
+                compared,
+                &format!("scatterings before: {}", depths.words()),
+                stronger,
+                weaker,
+            )
+        })
+    });
+    by_depth.chain(by_medium).chain(by_scene).collect()
 }
 
 #[cfg(test)]
@@ -345,5 +385,24 @@ mod tests {
         assert_eq!(found, [(BY_DEPTH, &vec![0.4, 1.0]), (BY_MEDIUM, &vec![0.0, 0.0])]);
         // A set that lacks the source's own says nothing.
         assert!(super::least(&errors[..2]).is_empty());
+    }
+
+    #[test]
+    fn smoke_runs_have_a_row_of_each_trend() {
+        let mut errors = Vec::new();
+        for scenario in &SCENARIOS {
+            for depths in Depths::ALL {
+                if is_of_smoke_run(scenario, depths) {
+                    errors.push(row(scenario.name, depths, 0.0, [0.5, 0.5]));
+                    errors.push(row(scenario.name, depths, 2.5, [0.25, 0.25]));
+                }
+            }
+        }
+        let trends = trends(&least(&errors));
+        let compared: Vec<&str> = trends.iter().map(|row| row.compared.as_str()).collect();
+        let all = [BY_DEPTH, BY_MEDIUM]
+            .into_iter()
+            .chain(WEAKER.map(|(compared, _)| compared));
+        assert_eq!(compared, all.collect::<Vec<_>>());
     }
 }

@@ -9,7 +9,7 @@ use std::time::Instant;
 use clerestory::gpu::{Gpu, Timings};
 use clerestory::render::Renderer;
 use clerestory::scene::LightKind;
-use clerestory::techniques::photon_mapping::PhotonMapper;
+use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 use clerestory::{Result, scene};
 use glam::Vec3;
 
@@ -27,6 +27,18 @@ const SMOKE_SCENES: usize = 1;
 const MEDIA_PASSES: [&str; 2] = ["photon: beams", "photon: plane rays"];
 const SURFACE_PASSES: &str = "photon: gather";
 const MAP_PASSES: [&str; 2] = ["map: ", "volume map: "];
+/// Where walks of photons and of eye paths start, and where each bounce of them begins.
+const STARTS: [&str; 3] = ["photon: emit", "photon: glow", "path: camera"];
+const BOUNCES: [&str; 2] = ["photon: extend", "path: extend"];
+/// Stages that have bounces, and how many of these stand by themselves, the last with all that come after it.
+const STAGES: [&str; 4] = ["photons", "eye rays", "density estimation", "queries of surfaces"];
+const PHOTONS: usize = 0;
+const RAYS: usize = 1;
+const ESTIMATION: usize = 2;
+const SURFACES: usize = 3;
+const BOUNCE_NAMES: [&str; 4] = ["1", "2", "3", "4 and later"];
+/// Loop iterations of a submission: more than a bounce's, so that each is of one piece.
+const SUBMISSION_WORK: u64 = 1 << 30;
 
 /// A frame of the source.
 struct Published {
@@ -116,6 +128,18 @@ rows! {
     beside "source: share of trace and density estimation" = |row| published(&row.scene, Published::share).into();
 }
 
+rows! {
+    /// A stage's bounce.
+    struct Stage = "Stages of a frame by bounce" by [scene, stage, bounce] {
+        scene: String = "scene",
+        stage: String = "stage",
+        bounce: String = "bounce",
+        jobs: Option<Repeats> = "jobs that begin",
+        time: Repeats = "time (ms)",
+        share: Repeats = "share of the frame (%)",
+    }
+}
+
 fn published<T>(scene: &str, of: fn(&Published) -> T) -> Option<T> {
     let place = SCENARIOS.iter().position(|scenario| scenario.name == scene)?;
     PUBLISHED.get(place).map(of)
@@ -131,6 +155,8 @@ impl Published {
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
     frames: Vec<Row>,
+    #[serde(default)]
+    stages: Vec<Stage>,
 }
 
 const CRITERIA: &[Criterion<Row>] = &[
@@ -152,12 +178,14 @@ impl Study for Found {
         let gpu = (context.gpu)()?;
         let name = |scenario: &Scenario| scenario.name.to_owned();
         let scenarios = context.first(&SCENARIOS, SMOKE_SCENES);
-        let frames = context.each_kept(&gpu, scenarios, name, |scenario| {
+        let mut stages = Vec::new();
+        let frames = context.each(scenarios, name, |scenario| {
             let (size, count, share) = context.pick(FULL, SMOKE);
             let frames = frames(&gpu, scenario, size, count, share)?;
+            stages.extend(stages_of(scenario, size, &frames));
             Ok(vec![Row::of(scenario, share, &frames)])
         })?;
-        Ok(Self { frames })
+        Ok(Self { frames, stages })
     }
 
     fn findings(&self) -> Findings {
@@ -189,6 +217,11 @@ impl Study for Found {
                 "Source: 512 × 512 pixels on a GPU of 2008, with up to four rays a pixel; its rays hold shadow rays. Rates are the stage's count over its time. A smoke run has a 256th of the \
                  photons.",
             )
+            .and(Findings::of(&self.stages, &[]))
+            .note(
+                "A stage is one kernel or a few over the jobs of a bounce. Jobs are those that a walk begins with, a photon or a pixel each; later ones are what is left of them. A bounce of photons ends where they \
+                 land or collide, one of eye rays behind the query of what it passed through.",
+            )
     }
 }
 
@@ -197,7 +230,10 @@ fn frames(gpu: &Gpu, scenario: &Scenario, size: [u32; 2], count: u32, share: u32
     let scene = scene::load(scenario.scene)?;
     let uploaded = Arc::clone(Renderer::new(gpu, &scene)?.gpu_scene());
     let camera = scene.require_camera(None)?;
-    let settings = scenario.settings(TWO_BOUNCES, Depths::UpToOne, share)?;
+    let settings = PhotonSettings {
+        submission_work: SUBMISSION_WORK,
+        ..scenario.settings(TWO_BOUNCES, Depths::UpToOne, share)?
+    };
     let mut mapper = PhotonMapper::new(gpu, Arc::clone(&uploaded), camera, size, settings)?;
     let mut frames = Vec::new();
     for number in 0..=count {
@@ -239,15 +275,17 @@ struct Frame {
     met: f64,
     /// Kernels about points of surfaces.
     gathered: f64,
+    /// Milliseconds by stage and bounce.
+    by_bounce: [[f64; BOUNCE_NAMES.len()]; STAGES.len()],
 }
 
 impl Frame {
     fn of(mapper: &mut PhotonMapper) -> Result<Self> {
-        let mut frame = Self::default();
+        let (mut frame, mut bounce) = (Self::default(), 0);
         let before = mapper.counts();
         let clock = Instant::now();
         while let Some(step) = mapper.step(1)? {
-            step.timings.iter().for_each(|timings| frame.add(timings));
+            step.timings.iter().for_each(|timings| frame.add(timings, &mut bounce));
         }
         frame.all = 1e3 * clock.elapsed().as_secs_f64();
         let after = mapper.counts();
@@ -260,21 +298,61 @@ impl Frame {
         Ok(frame)
     }
 
-    fn add(&mut self, timings: &Timings) {
+    /// Photons and eye paths are not under way at the same time: one number of bounces serves both.
+    fn add(&mut self, timings: &Timings, bounce: &mut usize) {
         for pass in &timings.passes {
             let milliseconds = milliseconds(pass);
             let is_of = |names: &[&str]| names.iter().any(|name| pass.name.starts_with(*name));
-            if is_of(&MEDIA_PASSES) {
+            if is_of(&STARTS) {
+                *bounce = 0;
+            }
+            *bounce += usize::from(is_of(&BOUNCES));
+            let stage = if is_of(&MEDIA_PASSES) {
                 self.estimation += milliseconds;
+                ESTIMATION
             } else if is_of(&[SURFACE_PASSES]) {
                 self.surfaces += milliseconds;
+                SURFACES
             } else if is_of(&[PHOTON_PASSES]) {
                 self.trace += milliseconds;
-            } else if !is_of(&MAP_PASSES) {
+                PHOTONS
+            } else if is_of(&MAP_PASSES) {
+                continue;
+            } else {
                 self.rays += milliseconds;
-            }
+                RAYS
+            };
+            // What comes before the first bounce begins it.
+            let place = bounce.saturating_sub(1).min(BOUNCE_NAMES.len() - 1);
+            self.by_bounce[stage][place] += milliseconds;
         }
     }
+}
+
+/// Milliseconds and shares of each stage and bounce, with the jobs that walks begin with.
+fn stages_of(scenario: &Scenario, size: [u32; 2], frames: &[Frame]) -> Vec<Stage> {
+    let pixels = f64::from(size[0] * size[1]);
+    let of_bounce = |stage: usize, bounce: usize| {
+        let jobs = |frame: &Frame| match (stage, bounce) {
+            (PHOTONS, 0) => Some(frame.emitted),
+            (RAYS, 0) => Some(pixels),
+            _ => None,
+        };
+        let of = |frame: &Frame| frame.by_bounce[stage][bounce];
+        Stage {
+            scene: scenario.name.into(),
+            stage: STAGES[stage].into(),
+            bounce: BOUNCE_NAMES[bounce].into(),
+            jobs: frames.iter().map(jobs).collect(),
+            time: frames.iter().map(of).collect(),
+            share: frames.iter().map(|frame| 100.0 * of(frame) / frame.all).collect(),
+        }
+    };
+    let stages = 0..STAGES.len();
+    stages
+        .flat_map(|stage| (0..BOUNCE_NAMES.len()).map(move |bounce| (stage, bounce)))
+        .map(|(stage, bounce)| of_bounce(stage, bounce))
+        .collect()
 }
 
 impl Row {

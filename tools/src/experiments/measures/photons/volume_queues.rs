@@ -1,10 +1,10 @@
-//! What queues and packets cost and gain where rays ask the volume map: time of density estimation, nodes fetched, and the stages of a frame with their jobs.
+//! What queues and packets cost and gain where rays ask the volume map: time of density estimation, nodes fetched, and the stages of a frame with their jobs, by a kernel each and fused.
 //!
 //! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4, Tables 7.4 and 7.5, of 512 × 512 pixels on a
 //! GPU of its time; scenes and media are those of `scenarios`.
 
 use clerestory::gpu::{Gpu, Timings};
-use clerestory::techniques::photon_mapping::{MapQuery, MapQueue, PhotonMapper, PhotonSettings};
+use clerestory::techniques::photon_mapping::{MapQuery, MapQueue, MapStages, PhotonMapper, PhotonSettings};
 use clerestory::{Result, scene};
 
 use super::cases::mapper;
@@ -27,12 +27,14 @@ const SUBMISSION_WORK: u64 = 1 << 30;
 /// How passes of rays' queries begin, with what finds and collects those that ask, and these alone.
 const RAY_PASSES: &str = "photon: beam";
 const COLLECTING_PASSES: [&str; 2] = ["photon: beam ways", "photon: beam queue"];
-/// Where a bounce begins.
+/// Where a bounce begins, and where it does with the fused kernel.
 const BOUNCE_PASS: &str = "path: extend";
+const FUSED_PASS: &str = "photon: rays and beams";
 
 /// The stages of a frame, each by how its passes begin: the first that fits.
-const STAGES: [(&str, &[&str]); 6] = [
+const STAGES: [(&str, &[&str]); 7] = [
     (RAYS, &[BOUNCE_PASS]),
+    (FUSED, &[FUSED_PASS]),
     (ESTIMATION, &[RAY_PASSES]),
     (SURFACES, &["photon: gather"]),
     (SCATTERING, &["path: medium", "path: shade"]),
@@ -40,6 +42,7 @@ const STAGES: [(&str, &[&str]); 6] = [
     ("starts, compaction, film", &["path: "]),
 ];
 const RAYS: &str = "closest hits of rays";
+const FUSED: &str = "closest hits and density estimation along rays";
 const ESTIMATION: &str = "density estimation along rays";
 const SURFACES: &str = "density estimation on surfaces";
 const SCATTERING: &str = "ways through media and scattering";
@@ -49,6 +52,19 @@ const SLOTS: &str = "I, slots";
 const COMPACTED: &str = "II, compacted";
 const BLOCKS: &str = "III, blocks";
 const PACKETS: &str = "packets, I";
+
+/// What the fused kernel does, by whatever kernels.
+const FUSIBLE: [&str; 3] = [RAYS, FUSED, ESTIMATION];
+/// How these kernels are called.
+const EACH: &str = "a kernel each";
+const ONE: &str = "one kernel";
+/// Rays of a path: which of them stand in a row, the first one and those after it.
+const PARTS: [(&str, [f64; 2]); 3] = [
+    ("first of a path", [1.0, 0.0]),
+    ("after it", [0.0, 1.0]),
+    (ALL_RAYS, [1.0, 1.0]),
+];
+const ALL_RAYS: &str = "all";
 
 /// A queue with a query, and what they are called.
 struct Form {
@@ -186,6 +202,20 @@ rows! {
     }
 }
 
+rows! {
+    /// What a kernel each does, or the fused one.
+    struct Fusion = "Closest hits and density estimation along rays, by a kernel each and fused" by [scene, kernels, rays] {
+        scene: String = "scene",
+        kernels: String = "kernels",
+        rays: String = "rays",
+        jobs: f64 = "jobs per frame",
+        passes: f64 = "passes of a bounce, compaction aside",
+        time: Repeats = "time (ms)",
+        share: Repeats = "share of the frame (%)",
+        change: Option<Repeats> = "over a kernel each (%)",
+    }
+}
+
 /// What was found.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
@@ -193,6 +223,8 @@ pub struct Found {
     forms: Vec<Row>,
     changes: Vec<Change>,
     stages: Vec<Stage>,
+    #[serde(default)]
+    fusions: Vec<Fusion>,
 }
 
 const OF_SCENES: &[Criterion<Seen>] = &[
@@ -248,31 +280,48 @@ const OF_CHANGES: &[Criterion<Change>] = &[Criterion::all(
 .among(|row| row.form != SLOTS && row.form != BLOCKS)
 .because("the source's claim leaves out its queue of type III")];
 
+const OF_FUSIONS: &[Criterion<Fusion>] = &[Criterion::each(
+    "a kernel each, the default, takes no longer than one: what one takes over it (%)",
+    Bound::AtLeast(0.0),
+    |row: &Fusion| row.change.as_ref().map_or(f64::NAN.into(), Repeats::measured),
+)
+.among(|row| row.change.is_some() && row.rays == ALL_RAYS)
+.because("the default is to be the faster one; the source has no fused form")];
+
 /// Milliseconds of a frame, by stage: of its first bounce, and of the others.
 #[derive(Debug, Clone, Copy, Default)]
 struct Frame {
     stages: [[f64; 2]; STAGES.len()],
     /// Of density estimation along rays, what comes before queries.
     collecting: f64,
+    /// Bounces that were recorded, and passes of all stages but the last.
+    bounces: u32,
+    passes: u32,
 }
 
 impl Frame {
     /// The mapper's next sample of each pixel, up to so many.
     fn of(mapper: &mut PhotonMapper, samples: u32) -> Result<Self> {
-        let (mut frame, mut bounces) = (Self::default(), 0);
+        let mut frame = Self::default();
+        let begins = match mapper.settings().stages {
+            MapStages::Stream => BOUNCE_PASS,
+            MapStages::Fused => FUSED_PASS,
+        };
         while let Some(step) = mapper.step(samples)? {
-            step.timings.iter().for_each(|timings| frame.add(timings, &mut bounces));
+            step.timings.iter().for_each(|timings| frame.add(timings, begins));
         }
         Ok(frame)
     }
 
-    fn add(&mut self, timings: &Timings, bounces: &mut u32) {
+    /// Bounces begin by the pass `begins`.
+    fn add(&mut self, timings: &Timings, begins: &str) {
         for pass in &timings.passes {
-            *bounces += u32::from(pass.name == BOUNCE_PASS);
+            self.bounces += u32::from(pass.name == begins);
             let milliseconds = milliseconds(pass);
             let fits = |(_, names): &(&str, &[&str])| names.iter().any(|name| pass.name.starts_with(name));
             if let Some(stage) = STAGES.iter().position(fits) {
-                self.stages[stage][usize::from(*bounces > 1)] += milliseconds;
+                self.stages[stage][usize::from(self.bounces > 1)] += milliseconds;
+                self.passes += u32::from(stage + 1 < STAGES.len());
             }
             if COLLECTING_PASSES.contains(&pass.name.as_str()) {
                 self.collecting += milliseconds;
@@ -288,6 +337,35 @@ impl Frame {
     fn all(&self) -> f64 {
         self.stages.as_flattened().iter().sum()
     }
+
+    /// What the fused kernel does, of a part of the rays.
+    fn fusible(&self, [first, later]: [f64; 2]) -> f64 {
+        let stages = STAGES.iter().zip(&self.stages);
+        let fusible = stages.filter(|((stage, _), _)| FUSIBLE.contains(stage));
+        fusible.map(|(_, times)| first * times[0] + later * times[1]).sum()
+    }
+}
+
+/// Rows of what is fused and what is not, from frames of both and the jobs of the first rays and of others.
+fn fusions(scenario: &Scenario, [each, one]: [&[Frame]; 2], jobs: [f64; 2]) -> Vec<Fusion> {
+    let row = |frames: &[Frame], kernels: &str, (rays, part): (&str, [f64; 2])| Fusion {
+        scene: scenario.name.into(),
+        kernels: kernels.into(),
+        rays: rays.into(),
+        jobs: part[0] * jobs[0] + part[1] * jobs[1],
+        passes: frames.first().map_or(f64::NAN, |frame| {
+            f64::from(frame.passes) / f64::from(frame.bounces.max(1))
+        }),
+        time: repeats(frames, |frame| frame.fusible(part)),
+        share: repeats(frames, |frame| 1e2 * frame.fusible(part) / frame.all()),
+        change: None,
+    };
+    let pair = |part| {
+        let (each, one) = (row(each, EACH, part), row(one, ONE, part));
+        let change = Some(one.time.change_from(&each.time));
+        [each, Fusion { change, ..one }]
+    };
+    PARTS.into_iter().flat_map(pair).collect()
 }
 
 fn repeats(frames: &[Frame], of: impl Fn(&Frame) -> f64) -> Repeats {
@@ -335,10 +413,11 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario) -> Resu
     let scene = scene::load(scenario.scene)?;
     let size = context.pick(SIZE, SMOKE_SIZE);
     let settings = scenario.settings(TWO_BOUNCES, Depths::UpToOne, context.pick(SHARE, SMOKE_SHARE))?;
-    let with = |form: &Form, count_fetches: bool| {
+    let with = |form: &Form, stages: MapStages, count_fetches: bool| {
         let settings = PhotonSettings {
             queue: form.queue,
             query: form.query,
+            stages,
             samples_per_pass: TURNS + 1,
             submission_work: SUBMISSION_WORK,
             count_fetches,
@@ -349,13 +428,18 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario) -> Resu
     let mut taken = Vec::new();
     let mut later = 0;
     for form in &FORMS {
-        let mut counting = with(form, true)?;
+        let mut counting = with(form, MapStages::Stream, true)?;
         Frame::of(&mut counting, 1)?;
         taken.push(Taken::of(&counting, form));
         later = counting.counts().ray_fetches.later_queries;
     }
-    let mut mappers: Vec<PhotonMapper> = FORMS.iter().map(|form| with(form, false)).collect::<Result<_>>()?;
-    let mut frames = [0; FORMS.len()];
+    let mut mappers: Vec<PhotonMapper> = FORMS
+        .iter()
+        .map(|form| (form, MapStages::Stream))
+        .chain([(&FORMS[0], MapStages::Fused)])
+        .map(|(form, stages)| with(form, stages, false))
+        .collect::<Result<_>>()?;
+    let mut frames = vec![0; mappers.len()];
     let turns = context.in_turns(TURNS as usize, mappers.len(), |i| {
         frames[i] += 1;
         Frame::of(&mut mappers[i], frames[i])
@@ -426,7 +510,9 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario) -> Resu
             bytes: change(taken[i].bytes, taken[0].bytes),
         });
     }
-    for (place, (stage, _)) in STAGES.iter().enumerate() {
+    let rays = eye.extend_rays as f64 * per_frame;
+    found.fusions = fusions(scenario, [&turns[0], &turns[FORMS.len()]], [pixels, rays - pixels]);
+    for (place, (stage, _)) in STAGES.iter().enumerate().filter(|(_, (stage, _))| *stage != FUSED) {
         let (jobs, later_jobs) = jobs(stage);
         found.stages.push(Stage {
             scene: scenario.name.into(),
@@ -454,6 +540,7 @@ impl Study for Found {
                 all.forms.extend(of_scene.forms);
                 all.changes.extend(of_scene.changes);
                 all.stages.extend(of_scene.stages);
+                all.fusions.extend(of_scene.fusions);
                 Ok(of_scene.scenes)
             },
         )?;
@@ -489,7 +576,12 @@ impl Study for Found {
                 "Tests stand for instructions. Bytes are those of nodes and records that are fetched, and of ways and places that a queue hands on; rates are reciprocals of times.",
             )
             .and(Findings::of(&self.stages, &[]))
-            .note("A stage is one kernel or a few, over the jobs of a bounce. No fused form of all stages stands beside them: it would need more descriptor sets than Vulkan promises.")
+            .note("A stage is one kernel or a few, over the jobs of a bounce.")
+            .and(Findings::of(&self.fusions, OF_FUSIONS))
+            .note(
+                "Type I by itself, by a kernel for the closest hits of rays and one for their ways through media and the queries along them, or by one for all that, whose pictures have the same bits; passes are \
+                 those between the start of a bounce and its compaction, and shadow rays. Surfaces, scattering and shadow rays are stages of their own in both.",
+            )
             .and(Findings::of(&self.scenes, OF_SCENES))
     }
 }

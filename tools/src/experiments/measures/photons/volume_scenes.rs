@@ -1,11 +1,11 @@
-//! The source's nine scenes of photons in media, and light that falls through a passage into haze: their media beside its table, and the light of these media by photons beside the path
-//! tracer's, in its mean and in its error at equal time.
+//! The source's nine scenes of photons in media, light that falls through a passage into haze, a cloud and wax: the media of the first beside its table, and the light of all by photons beside the
+//! path tracer's, in its mean and in its error at equal time.
 //!
 //! Source of the table: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, Table 7.1.
 
 use std::time::Duration;
 
-use clerestory::film::Picture;
+use clerestory::film::{Picture, ToneCurve, ToneMap, png};
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{DensityGrid, LightKind, Phase};
@@ -25,19 +25,30 @@ use crate::experiments::watch::render;
 
 /// Light that was scattered once or twice, in a medium at least once. What a mirror throws into a medium is not among it: no path from the eye finds a lamp without area there.
 const PATHS: &str = "L(V|[DGV]V|V.)E";
+/// Light that was scattered in a medium, however often: what is seen of a body behind its surface.
+const OF_BODIES: &str = "L.*V.*E";
 /// Pixels, and samples a pixel of references, and of each picture of a smoke run.
 const FULL: ([u32; 2], u32) = ([32, 24], 4096);
 const SMOKE: ([u32; 2], u32) = ([8, 6], 16);
 const SMOKE_SPP: u32 = 2;
 /// Seconds of a picture.
-const SECONDS: f64 = 2.0;
+const SECONDS: f64 = 1.5;
 /// Pictures of each technique.
 const TURNS: usize = 5;
 const TECHNIQUES: [&str; 2] = ["path", "photon"];
 /// Scenes of a smoke run.
 const SMOKE_SCENES: usize = 1;
-/// What the source has not, with its name: light that falls through a passage.
-const OWN: [(&str, &str); 1] = [("passage, haze", "builtin:passage?sigma_a=0.05&sigma_s=0.5&g=0.6")];
+/// What the source has not, with its name and light paths: light that falls through a passage, a dense grid that scatters forward, and a solid whose inside scatters.
+const OWN: [(&str, &str, &str); 3] = [
+    ("passage, haze", HAZE, PATHS),
+    ("cloud", "builtin:cloud?size=32", PATHS),
+    ("wax", "builtin:wax", OF_BODIES),
+];
+const HAZE: &str = "builtin:passage?sigma_a=0.05&sigma_s=0.5&g=0.6";
+/// The picture of shafts of light in haze: its pixels, and samples of each; the same of a smoke run.
+const SHAFTS: &str = "haze.png";
+const SHAFTS_FORM: ([u32; 2], u32) = ([160, 120], 64);
+const SHAFTS_SMOKE_FORM: ([u32; 2], u32) = ([16, 12], 1);
 /// Means may differ by that much, relatively, or by so many standard errors.
 const ALLOWED: f64 = 0.01;
 const DEVIATIONS: f64 = 3.0;
@@ -123,19 +134,21 @@ impl Study for Found {
         let gpu = (context.gpu)()?;
         let name = |scenario: &Scenario| scenario.name.to_owned();
         let media = context.each(&SCENARIOS, name, |scenario| Ok(vec![MediumRow::of(scenario)?]))?;
-        let of_source = SCENARIOS.iter().map(|scenario| (scenario.name, scenario.scene));
-        let all: Vec<(&str, &str)> = of_source.chain(OWN).collect();
-        let name = |(name, _): &(&str, &str)| (*name).to_owned();
-        let light = context.each_kept(&gpu, context.first(&all, SMOKE_SCENES), name, |(name, address)| {
-            let stage = Stage::new(context, &gpu, address)?;
+        let of_source = SCENARIOS.iter().map(|scenario| (scenario.name, scenario.scene, PATHS));
+        let all: Vec<(&str, &str, &'static str)> = of_source.chain(OWN).collect();
+        let name = |(name, ..): &(&str, &str, &'static str)| (*name).to_owned();
+        let cases = context.first(&all, SMOKE_SCENES);
+        let light = context.each_kept(&gpu, cases, name, |(name, address, paths)| {
+            let stage = Stage::new(context, &gpu, address, paths)?;
             let row = stage.map(|stage| stage.row(context, name)).transpose()?;
             Ok(Vec::from_iter(row.flatten()))
         })?;
+        show_shafts(context, &gpu)?;
         Ok(Self { media, light })
     }
 
     fn findings(&self) -> Findings {
-        Findings::of(&self.media, OF_MEDIA)
+        let found = Findings::of(&self.media, OF_MEDIA)
             .headline(
                 "relative RMSE of photons over that of the path tracer at equal time, geometric mean",
                 geometric_mean(self.light.iter().map(|row| row.ratio.measured())),
@@ -146,11 +159,21 @@ impl Study for Found {
             )
             .and(Findings::of(&self.light, OF_LIGHT))
             .note(format!(
-                "Light that was scattered once or twice, in the medium at least once, and not by a mirror first. {} × {} pixels; {TURNS} pictures of {SECONDS} s by each technique, in \
-                 turns, with default settings, beside a reference by the path tracer of {} samples a pixel, whose variance is subtracted from errors. Means are those of the reference and of \
+                "Light that was scattered once or twice, in the medium at least once, and not by a mirror first; of wax all that was scattered in it. {} × {} pixels; {TURNS} pictures of {SECONDS} s by each \
+                 technique, in turns, with default settings, beside a reference by the path tracer of {} samples a pixel, whose variance is subtracted from errors. Means are those of the reference and of \
                  all pictures of photons.",
                 FULL.0[0], FULL.0[1], FULL.1,
-            ))
+            ));
+        if self.light.is_empty() {
+            return found;
+        }
+        found.picture(
+            SHAFTS,
+            &format!(
+                "Light that falls through a passage into haze lies in shafts in the air: photons with default settings, {} passes.",
+                SHAFTS_FORM.1
+            ),
+        )
     }
 }
 
@@ -192,10 +215,32 @@ impl MediumRow {
     }
 }
 
+/// Renders haze behind a passage, for the page's picture.
+fn show_shafts(context: &Context<'_>, gpu: &Gpu) -> Result<()> {
+    let (size, spp) = context.pick(SHAFTS_FORM, SHAFTS_SMOKE_FORM);
+    let renderer = Renderer::new(gpu, &scene::load(HAZE)?)?;
+    let options = RenderOptions {
+        technique: Some("photon".into()),
+        size,
+        spp,
+        ..RenderOptions::default()
+    };
+    if let Some(rendered) = render(&renderer, &options, context.watch)? {
+        let layer = rendered.picture.main_layer()?;
+        let tone = ToneMap {
+            exposure: -mean(&rendered.picture)?.max(f64::MIN_POSITIVE).log2(),
+            curve: ToneCurve::Bands,
+        };
+        context.picture(SHAFTS, &png::tone_mapped(layer, size[0], &tone));
+    }
+    Ok(())
+}
+
 /// A scene with its reference.
 struct Stage {
     renderer: Renderer,
     reference: Picture,
+    paths: &'static str,
     base: RenderOptions,
 }
 
@@ -204,7 +249,7 @@ type Scored = [f64; 3];
 
 impl Stage {
     /// Renders the reference; `None` when it was stopped.
-    fn new(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Option<Self>> {
+    fn new(context: &Context<'_>, gpu: &Gpu, address: &str, paths: &'static str) -> Result<Option<Self>> {
         let renderer = Renderer::new(gpu, &scene::load(address)?)?;
         let (size, spp) = context.pick(FULL, SMOKE);
         let base = RenderOptions {
@@ -215,13 +260,14 @@ impl Stage {
             technique: Some("path".into()),
             spp,
             seed: SEED,
-            settings: json!({ "path_set": PATHS, "sampler": "pcg" }).into(),
+            settings: json!({ "path_set": paths, "sampler": "pcg" }).into(),
             ..base.clone()
         };
         let rendered = render(&renderer, &of_reference, context.watch)?;
         Ok(rendered.map(|rendered| Self {
             renderer,
             reference: rendered.picture,
+            paths,
             base,
         }))
     }
@@ -234,7 +280,7 @@ impl Stage {
             // A smoke run has no time.
             spp: context.pick(SPP_MAX, SMOKE_SPP),
             time_budget: context.pick(Some(Duration::from_secs_f64(SECONDS)), None),
-            settings: json!({ "path_set": PATHS }).into(),
+            settings: json!({ "path_set": self.paths }).into(),
             ..self.base.clone()
         };
         let Some(rendered) = render(&self.renderer, &options, context.watch)? else {

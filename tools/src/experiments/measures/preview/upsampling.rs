@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::pictures::finished;
+use crate::experiments::measures::pictures::{Panel, finished, light_panel, mean_of, tiled};
 use crate::experiments::reference::short_name;
 
 const SCENES: [&str; 3] = ["builtin:cornell-box", "builtin:box-room", "builtin:conference"];
@@ -34,6 +34,13 @@ const TURNS: usize = 5;
 /// Distance from the tangent plane up to which a neighbour counts, over the diagonal of the scene, and the least cosine of its normal.
 const PLANE: f64 = 0.01;
 const NORMAL: f32 = 0.9;
+/// Pictures by factor, with what is defective of them in a color of its own, beside the same light at all pixels.
+const SHOWN: &str = "defective.png";
+const DEFECTIVE: [u8; 3] = [255, 0, 255];
+/// Pixels along a side that show one.
+const ENLARGED: u32 = 2;
+/// What is white in a picture, over its mean.
+const WHITE: f64 = 3.0;
 const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
 
 rows! {
@@ -153,10 +160,22 @@ fn error(found: &UpsampledPicture, sound: &[bool], truth: &[[f32; 3]]) -> f64 {
     (squares * count).sqrt() / sum
 }
 
-fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>> {
+/// Light up to a brightness, with what is defective marked.
+fn panel(values: &[[f32; 3]], defective: &[bool], white: f64) -> Panel {
+    let mut panel = light_panel(values.as_flattened(), white);
+    for (color, _) in panel.iter_mut().zip(defective).filter(|(_, defective)| **defective) {
+        *color = DEFECTIVE;
+    }
+    panel
+}
+
+/// Rows, and panels of the factors.
+fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<(Vec<Row>, Vec<Panel>)> {
     let (side, lights) = (context.pick(SIDE, SMOKE_SIDE), context.pick(LIGHTS, SMOKE_LIGHTS));
     let subject = Subject::new(gpu, address)?;
     let truth = subject.light(gpu, side, lights)?;
+    let white = WHITE * mean_of(truth.as_flattened()).max(f64::MIN_POSITIVE);
+    let mut panels = vec![panel(&truth, &[], white)];
     let mut rows = Vec::new();
     for factor in FACTORS {
         let values = subject.light(gpu, side / factor, lights)?;
@@ -175,6 +194,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>>
         let (bilinear, _) = upsample(gpu, &subject, all, &values)?;
         let sound: Vec<bool> = found.defective.iter().map(|defective| !defective).collect();
         let time = context.in_turns(TURNS, 1, |_| Ok(upsample(gpu, &subject, desc, &values)?.1))?;
+        panels.push(panel(&found.values, &found.defective, white));
         let (own, other) = (error(&found, &sound, &truth), error(&bilinear, &sound, &truth));
         rows.push(Row {
             scene: short_name(address).into(),
@@ -186,21 +206,27 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>>
             time: Repeats(time.concat()),
         });
     }
-    Ok(rows)
+    Ok((rows, panels))
 }
 
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
         let name = |address: &&str| short_name(address).to_owned();
-        context.each(context.first(&SCENES, 1), name, |address| {
-            of_scene(context, &gpu, address)
-        })
+        let mut shown = Vec::new();
+        let rows = context.each(context.first(&SCENES, 1), name, |address| {
+            let (rows, panels) = of_scene(context, &gpu, address)?;
+            shown.push(panels);
+            Ok(rows)
+        })?;
+        let side = context.pick(SIDE, SMOKE_SIDE);
+        context.picture(SHOWN, &tiled([side; 2], ENLARGED, &shown));
+        Ok(rows)
     }
 
     fn findings(&self) -> Findings {
         let quarter = self.iter().filter(|row| row.factor == 4);
-        Findings::of(self, CRITERIA)
+        let found = Findings::of(self, CRITERIA)
             .headline(
                 "RMSE over that of bilinear upsampling, at a quarter of the side, geometric mean of three scenes",
                 geometric_mean(quarter.map(|row| row.over.into())),
@@ -210,6 +236,13 @@ impl Study for Found {
                  and with a cosine of its normal above {NORMAL}. Errors are those of pixels that are not defective. Pixels of both pictures are \
                  means over their areas, while what tells surfaces apart are their middles: at edges a mean over two surfaces stands for one, which all neighbours hide better. Defective are pixels that no neighbour shares a \
                  surface with: in the conference room legs and arms of chairs are thinner than a pixel of the small picture.",
-            ))
+            ));
+        if self.is_empty() {
+            return found;
+        }
+        found.picture(
+            SHOWN,
+            "Light at all pixels, and upsampled from a half, a quarter and an eighth of the side, a row a scene; what is defective is magenta.",
+        )
     }
 }

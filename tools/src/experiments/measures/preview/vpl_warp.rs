@@ -3,11 +3,12 @@
 //! Sources: P. Clarberg et al., SIGGRAPH 2005; C. Sun, Master's thesis, WPI, 2015, §4.8. Oracle: sums over all texels, in f64.
 
 use clerestory::Result;
-use clerestory::raster::reflective::{flux_levels, rsm_radical_inverse, warp_through};
-use glam::{DVec2, DVec3};
+use clerestory::raster::reflective::{flux_levels, rsm_radical_inverse, rsm_warp, warp_through};
+use glam::{DVec2, DVec3, UVec2};
 
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::pictures::{Panel, tiled};
 use crate::random::Random;
 
 /// Texels along a side of a map.
@@ -22,6 +23,16 @@ const HEIGHT: f64 = 0.4;
 /// Squares of a chequered texture along a side, and what its dark ones reflect of its bright ones.
 const SQUARES: f64 = 12.0;
 const DARK: f64 = 0.1;
+/// Points of a picture, and pixels along a side of a panel.
+const SHOWN_POINTS: u32 = 512;
+const SHOWN_SIDE: u32 = 256;
+const STEPS: &str = "steps.png";
+const SPOTS: &str = "spots.png";
+/// What four texels reflect: left and right above, left and right below.
+const FOUR: [f64; 4] = [1.0, 3.0, 6.0, 2.0];
+/// Grey of the brightest texel below points, and their color.
+const BRIGHTEST: f64 = 160.0;
+const POINT: [u8; 3] = [255, 160, 0];
 
 /// How points are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -237,10 +248,70 @@ fn worth(rows: &[Row]) -> Vec<Worth> {
     of_ways.filter_map(worth).collect()
 }
 
+/// Points of the unit square over what reflects there, the most of which is 1.
+fn overlay(reflected: impl Fn(DVec2) -> f64, points: impl Iterator<Item = DVec2>) -> Panel {
+    let side = f64::from(SHOWN_SIDE);
+    let pixels = (0..SHOWN_SIDE * SHOWN_SIDE).map(|i| DVec2::from([i % SHOWN_SIDE, i / SHOWN_SIDE].map(f64::from)));
+    let mut panel: Panel = pixels
+        .map(|pixel| [(BRIGHTEST * reflected((pixel + 0.5) / side)) as u8; 3])
+        .collect();
+    for point in points {
+        // Squares of two pixels, of which a point is the middle.
+        let [x, y] = (point * side - 0.5)
+            .clamp(DVec2::ZERO, DVec2::splat(side - 2.0))
+            .as_uvec2()
+            .to_array();
+        for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            panel[((y + j) * SHOWN_SIDE + x + i) as usize] = POINT;
+        }
+    }
+    panel
+}
+
+/// Independent points over four texels: as they are, behind the step along the vertical, and behind that along the horizontal.
+fn steps_shown() -> Vec<Panel> {
+    let mut random = Random::new(23);
+    let points: Vec<[DVec2; 3]> = (0..SHOWN_POINTS)
+        .map(|_| {
+            let point = DVec2::new(random.unit(), random.unit());
+            let (texel, place) = rsm_warp(FOUR, point);
+            let warped = 0.5 * (texel.as_dvec2() + place);
+            [point, DVec2::new(point.x, warped.y), warped]
+        })
+        .collect();
+    let most = FOUR.into_iter().fold(0.0, f64::max);
+    let reflected = |at: DVec2| {
+        let [column, row] = (2.0 * at).as_uvec2().min(UVec2::ONE).to_array();
+        FOUR[(2 * row + column) as usize] / most
+    };
+    [0, 1, 2]
+        .map(|step| overlay(reflected, points.iter().map(|all| all[step])))
+        .into()
+}
+
+/// Halton's points, warped, over a map.
+fn spots_shown(map: &[f64]) -> Panel {
+    let levels = flux_levels(map, SIDE);
+    let points = (0..SHOWN_POINTS).filter_map(|number| {
+        let point = DVec2::new(rsm_radical_inverse(number, 2), rsm_radical_inverse(number, 3));
+        let (texel, _) = warp_through(&levels, point)?;
+        Some(middle(texel))
+    });
+    let most = map.iter().copied().fold(0.0, f64::max);
+    let reflected = |at: DVec2| {
+        let [x, y] = (at * SIDE as f64).as_uvec2().to_array();
+        map[(y as usize).min(SIDE - 1) * SIDE + (x as usize).min(SIDE - 1)] / most
+    };
+    overlay(reflected, points)
+}
+
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let (points, frames) = (context.first(&POINTS, 1), context.pick(FRAMES, 32));
         let maps = maps();
+        context.picture(STEPS, &tiled([SHOWN_SIDE; 2], 1, &[steps_shown()]));
+        let spots: Vec<Panel> = maps[1..].iter().map(|(_, map)| spots_shown(map)).collect();
+        context.picture(SPOTS, &tiled([SHOWN_SIDE; 2], 1, &[spots]));
         context.each(
             context.first(&maps, 1),
             |(name, _)| (*name).to_owned(),
@@ -250,7 +321,7 @@ impl Study for Found {
 
     fn findings(&self) -> Findings {
         let worth = worth(self);
-        Findings::of(self, OF_ROWS)
+        let found = Findings::of(self, OF_ROWS)
             .headline(
                 "variance of texels alike over that of warped points of Halton (geometric mean)",
                 geometric_mean(worth.iter().map(|row| Measured::exact(row.warped * row.halton))),
@@ -259,6 +330,18 @@ impl Study for Found {
             .note(format!(
                 "Maps of {SIDE}² texels, by twins in f64. Shares are those of {PARTS}² parts in what all texels reflect. The receiver faces the middle of the map from {HEIGHT} of its width away. A \
                  frame has its own shift, or its own random points; {FRAMES} frames each."
-            ))
+            ));
+        if self.is_empty() {
+            return found;
+        }
+        found
+            .picture(
+                STEPS,
+                "Independent points over four texels, brighter where these reflect more: as they are, behind the step along the vertical, and behind that along the horizontal.",
+            )
+            .picture(
+                SPOTS,
+                "512 virtual lights by Halton's points on the maps of two spots, plain and textured.",
+            )
     }
 }

@@ -7,22 +7,17 @@
 use std::sync::Arc;
 
 use clerestory::film::picture::{self, Picture};
-use clerestory::film::png::{self, Rgb8};
-use clerestory::film::tone::{ToneCurve, ToneMap};
 use clerestory::film::{CompareOptions, compare};
-use clerestory::gpu::shaders::constants::SHADING_NORMAL_BITS;
-use clerestory::gpu::{Area, Gpu, Timings};
-use clerestory::maps::packed_direction::unpack_octahedral;
-use clerestory::raster::{GBuffer, GBufferDesc, Layering, Output, View};
-use clerestory::scene::{LightKind, Scene};
+use clerestory::gpu::{Gpu, Timings};
+use clerestory::scene::Scene;
 use clerestory::techniques::instant_radiosity::Bound;
-use clerestory::techniques::instant_radiosity::many_light::{Interleaving, ManyLight, ManyLightSettings};
+use clerestory::techniques::instant_radiosity::many_light::{ManyLight, ManyLightSettings};
 use clerestory::techniques::{PathTracer, PathTracerSettings};
 use clerestory::transport::random::SamplerKind;
 use clerestory::transport::{GpuScene, PathSet};
 use clerestory::{Result, scene};
-use glam::{Vec3, Vec4};
 
+use super::deferred_pictures::{self, write_pictures};
 use crate::experiments::findings::{
     Axes, Bound as Limit, Criterion, Findings, Measured, Repeats, Study, curves, geometric_mean, rows,
 };
@@ -34,10 +29,8 @@ use crate::timing::timed;
 const SCENES: [&str; 3] = ["builtin:cornell-box", "builtin:box-room", "builtin:conference"];
 /// Scenes in which few lights of many are seen from where the camera is, and one in which most are.
 const DARK_SCENES: [&str; 3] = ["builtin:passage", "builtin:divider-room", "builtin:cornell-box"];
-/// The scene of the pictures.
-const SHOWN: &str = "builtin:cornell-box?source=spot";
-const ALL: &str = "bounces=0..2,lobes=diffuse+glossy";
-const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
+pub(super) const ALL: &str = "bounces=0..2,lobes=diffuse+glossy";
+pub(super) const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
 
 const FULL: Form = Form {
     side: 96,
@@ -62,11 +55,7 @@ const SMOKE: Form = Form {
 /// Frames that the light of a tile is judged by.
 const DARK_FRAMES: u32 = 4;
 /// Tiles along a side.
-const TILES: u32 = 4;
-/// Pixels along a side of a picture.
-const PICTURE_SIDE: u32 = 256;
-const PICTURE_SMOKE_SIDE: u32 = 32;
-const PICTURE_LIGHTS: u32 = 256;
+pub(super) const TILES: u32 = 4;
 
 #[derive(Clone, Copy)]
 struct Form {
@@ -161,6 +150,9 @@ pub struct Found {
     tiles: Vec<Tiles>,
     dark: Vec<Dark>,
     has_pictures: bool,
+    /// Whether pictures of albedo, of split normals, of the reflective shadow map and of direct light were written, too.
+    #[serde(default)]
+    has_further_pictures: bool,
 }
 
 const OF_STAGES: &[Criterion<Row>] = &[
@@ -250,19 +242,20 @@ impl Stages {
 }
 
 /// A scene on the device.
-struct Subject {
-    scene: Scene,
-    on_device: Arc<GpuScene>,
+pub(super) struct Subject {
+    pub scene: Scene,
+    pub on_device: Arc<GpuScene>,
 }
 
 impl Subject {
-    fn new(gpu: &Gpu, address: &str) -> Result<Self> {
+    pub fn new(gpu: &Gpu, address: &str) -> Result<Self> {
         let scene = scene::load(address)?;
         let on_device = Arc::new(GpuScene::new(gpu, &scene)?);
         Ok(Self { scene, on_device })
     }
 
-    fn renderer(&self, gpu: &Gpu, side: u32, settings: ManyLightSettings) -> Result<ManyLight> {
+    /// Frames of it.
+    pub fn renderer(&self, gpu: &Gpu, side: u32, settings: ManyLightSettings) -> Result<ManyLight> {
         ManyLight::new(
             gpu,
             Arc::clone(&self.on_device),
@@ -273,7 +266,7 @@ impl Subject {
     }
 
     /// A picture of so many frames.
-    fn picture(&self, gpu: &Gpu, side: u32, frames: u32, settings: ManyLightSettings) -> Result<Picture> {
+    pub fn picture(&self, gpu: &Gpu, side: u32, frames: u32, settings: ManyLightSettings) -> Result<Picture> {
         let mut renderer = self.renderer(gpu, side, settings)?;
         finished(&mut renderer, frames)
     }
@@ -460,153 +453,6 @@ fn dark_of_scene(gpu: &Gpu, subject: &Subject, name: &str, form: Form) -> Result
     Ok(rows)
 }
 
-/// What a view sees, as pictures: normals, and places in the box around the scene.
-fn seen(gpu: &Gpu, subject: &Subject, view: View, side: u32) -> Result<[Rgb8; 2]> {
-    let surfaces = subject.on_device.surfaces();
-    let desc = GBufferDesc {
-        size: [side; 2],
-        layering: Layering::One,
-        outputs: &[Output::Normals, Output::Position],
-    };
-    let gbuffer = GBuffer::new(gpu, &surfaces, &desc)?;
-    let mut recorder = gpu.recorder("what is seen")?;
-    gbuffer.record(&mut recorder, &surfaces, &[view])?;
-    recorder.submit()?.wait()?;
-    let positions: Vec<[f32; 4]> = gbuffer.read(gpu, Output::Position)?;
-    let words: Vec<[u32; 2]> = gbuffer.read(gpu, Output::Normals)?;
-    let [lower, upper] = subject.on_device.bounds();
-    let shown = |color: Vec3| {
-        color
-            .to_array()
-            .map(|value| (255.0 * value.clamp(0.0, 1.0)).round() as u8)
-    };
-    let is_there = |place: &[f32; 4]| place[3] != 0.0;
-    let normals = words.iter().zip(&positions).flat_map(|(words, place)| {
-        let normal = unpack_octahedral(words[1], SHADING_NORMAL_BITS).as_vec3();
-        shown(if is_there(place) {
-            0.5 + 0.5 * normal
-        } else {
-            Vec3::ZERO
-        })
-    });
-    let places = positions.iter().flat_map(|place| {
-        let within = (Vec4::from_array(*place).truncate() - lower) / (upper - lower);
-        shown(if is_there(place) { within } else { Vec3::ZERO })
-    });
-    let picture = |bytes: Vec<u8>| Rgb8 {
-        width: side,
-        height: side,
-        bytes,
-    };
-    Ok([picture(normals.collect()), picture(places.collect())])
-}
-
-/// The pixels of a picture by tiles, each tinted by its own color.
-fn split(picture: &Rgb8) -> Rgb8 {
-    let [width, height] = [picture.width, picture.height];
-    let [across, down] = Interleaving::new([width, height], TILES).tile();
-    let mut bytes = vec![0; picture.bytes.len()];
-    for y in 0..height {
-        for x in 0..width {
-            let tile = [x % TILES, y % TILES];
-            let to = [tile[0] * across + x / TILES, tile[1] * down + y / TILES];
-            if to[0] >= width || to[1] >= height {
-                continue;
-            }
-            let tint = [255 - 40 * tile[0], 255, 255 - 40 * tile[1]];
-            for (channel, tint) in tint.into_iter().enumerate() {
-                let from = u32::from(picture.bytes[3 * (y * width + x) as usize + channel]);
-                bytes[3 * (to[1] * width + to[0]) as usize + channel] = (from * tint / 255) as u8;
-            }
-        }
-    }
-    Rgb8 { width, height, bytes }
-}
-
-/// Files of the pictures, with what they show.
-const PICTURES: [(&str, &str); 7] = [
-    ("normals.png", "Shading normals of the G-buffer."),
-    ("places.png", "Places of the G-buffer, in the box around the scene."),
-    (
-        "rsm.png",
-        "The reflective shadow map of the spot: places that it lights.",
-    ),
-    (
-        "split.png",
-        "Indirect light of one frame in the split picture: 4 × 4 tiles, each with a sixteenth of 256 walks' virtual lights, and tinted by its own color.",
-    ),
-    (
-        "merged.png",
-        "The same, merged: neighbours have other lights, which shows as a pattern.",
-    ),
-    (
-        "filtered.png",
-        "The same, filtered over neighbours on the same surface.",
-    ),
-    ("combined.png", "With direct light."),
-];
-
-fn write_pictures(context: &Context<'_>, gpu: &Gpu) -> Result<()> {
-    let subject = Subject::new(gpu, SHOWN)?;
-    let side = context.pick(PICTURE_SIDE, PICTURE_SMOKE_SIDE);
-    let area = Area::whole([side; 2]);
-    let surfaces = subject.on_device.surfaces();
-    let [normals, places] = seen(
-        gpu,
-        &subject,
-        View::of_camera(&subject.scene.cameras[0], &surfaces, area)?,
-        side,
-    )?;
-    let spot = subject.scene.lights.iter().find_map(|light| match light.kind {
-        LightKind::Spot {
-            position,
-            direction,
-            outer,
-            ..
-        } => Some((position, direction, outer)),
-        _ => None,
-    });
-    let rsm = match spot {
-        Some((position, direction, outer)) => {
-            let near = View::near_plane(position, &surfaces);
-            let view = View::of_square(position, direction, outer, near, area)?;
-            Some(seen(gpu, &subject, view, side)?[1].clone())
-        }
-        None => None,
-    };
-    let tone = ToneMap {
-        exposure: 0.0,
-        curve: ToneCurve::Photographic,
-    };
-    let shown = |filter, path_set: &str, frames| -> Result<Rgb8> {
-        let settings = ManyLightSettings {
-            lights: PICTURE_LIGHTS,
-            interleave: TILES,
-            filter,
-            path_set: path_set.parse()?,
-            ..ManyLightSettings::default()
-        };
-        let picture = subject.picture(gpu, side, frames, settings)?;
-        Ok(png::tone_mapped(picture.require(picture::RADIANCE)?, side, &tone))
-    };
-    let merged = shown(false, INDIRECT, 1)?;
-    let pictures = [
-        Some(normals),
-        Some(places),
-        rsm,
-        Some(split(&merged)),
-        Some(merged),
-        Some(shown(true, INDIRECT, 1)?),
-        Some(shown(true, ALL, 16)?),
-    ];
-    for ((file, _), picture) in PICTURES.iter().zip(pictures) {
-        if let Some(picture) = picture {
-            context.picture(file, &picture);
-        }
-    }
-    Ok(())
-}
-
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
@@ -632,6 +478,7 @@ impl Study for Found {
             tiles,
             dark,
             has_pictures: true,
+            has_further_pictures: true,
         })
     }
 
@@ -670,9 +517,13 @@ impl Study for Found {
             FULL.frame_side, FULL.samples, FULL.reference,
         ));
         let all = stages.and(beside).and(tiles).and(dark);
-        if !self.has_pictures {
-            return all;
-        }
-        PICTURES.iter().fold(all, |all, (file, words)| all.picture(file, words))
+        let shown = if self.has_pictures {
+            deferred_pictures::shown(self.has_further_pictures)
+        } else {
+            Vec::new()
+        };
+        shown
+            .into_iter()
+            .fold(all, |all, (file, words)| all.picture(file, words))
     }
 }

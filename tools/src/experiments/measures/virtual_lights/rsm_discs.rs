@@ -5,7 +5,11 @@
 
 use std::sync::Arc;
 
+use clerestory::film::picture;
+use clerestory::film::png;
+use clerestory::film::tone::{ToneCurve, ToneMap};
 use clerestory::gpu::Gpu;
+use clerestory::raster::reflective::{rsm_disc_place, rsm_disc_weight, rsm_radical_inverse};
 use clerestory::scene::Scene;
 use clerestory::techniques::instant_radiosity::Bound;
 use clerestory::techniques::instant_radiosity::many_light::{
@@ -13,10 +17,11 @@ use clerestory::techniques::instant_radiosity::many_light::{
 };
 use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
+use glam::DVec2;
 
 use crate::experiments::findings::{Axes, Bound as Limit, Criterion, Findings, Repeats, Study, curves, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::pictures::{finished, mean};
+use crate::experiments::measures::pictures::{Panel, finished, mean, tiled};
 use crate::experiments::reference::short_name;
 use crate::timing::median;
 
@@ -49,6 +54,16 @@ const SMOKE: Form = Form {
     samples: 64,
     lights: 256,
 };
+/// A disc's samples with their weights, and the light that discs of the published radius gather.
+const DISC: &str = "disc.png";
+const GATHERED: &str = "gathered.png";
+/// Pixels along a side of either; the same of a smoke run.
+const SHOWN_SIDE: [u32; 2] = [256, 32];
+/// Samples of a disc that is shown, as many as published, and the frames of what they gather.
+const SHOWN_SAMPLES: u32 = 400;
+const SHOWN_FRAMES: u32 = 4;
+/// Width over the panel's of the mark of a sample with the mean weight.
+const MARK: f64 = 0.025;
 /// Seeds of each; the same of a smoke run.
 const SEEDS: [u32; 2] = [5, 2];
 
@@ -172,9 +187,52 @@ fn rows_of(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>> 
     Ok(rows)
 }
 
+/// The samples of a disc, each as a mark whose area is its weight.
+fn disc_shown(side: u32, squared: bool) -> Panel {
+    let (width, radius) = (f64::from(side), 0.5 * f64::from(side));
+    let disc = std::f64::consts::PI * radius * radius;
+    let mut panel: Panel = vec![[0; 3]; (side * side) as usize];
+    for number in 0..SHOWN_SAMPLES {
+        let along = (f64::from(number) + 0.5) / f64::from(SHOWN_SAMPLES);
+        let point = DVec2::new(along, rsm_radical_inverse(number, 2));
+        let middle = DVec2::splat(radius) + (1.0 - MARK) * rsm_disc_place(point, radius);
+        let half = 0.5 * MARK * width * (rsm_disc_weight(along, radius, squared) / disc).sqrt();
+        for (i, color) in panel.iter_mut().enumerate() {
+            let pixel = DVec2::new((i % side as usize) as f64, (i / side as usize) as f64) + 0.5;
+            if (pixel - middle).length() < half {
+                *color = [255; 3];
+            }
+        }
+    }
+    panel
+}
+
+fn write_pictures(context: &Context<'_>, gpu: &Gpu) -> Result<()> {
+    let side = context.pick(SHOWN_SIDE[0], SHOWN_SIDE[1]);
+    let discs = [false, true].map(|squared| disc_shown(side, squared));
+    context.picture(DISC, &tiled([side; 2], 1, &[Vec::from(discs)]));
+    let scene = scene::load(SCENES[0])?;
+    let on_device = Arc::new(GpuScene::new(gpu, &scene)?);
+    let form = Form {
+        side,
+        samples: SHOWN_SAMPLES,
+        ..context.pick(FULL, SMOKE)
+    };
+    let mut rendering = rendering(gpu, (&scene, &on_device), form, Gathering::Disc, PUBLISHED)?;
+    let gathered = finished(&mut rendering, SHOWN_FRAMES)?;
+    let tone = ToneMap {
+        exposure: 0.0,
+        curve: ToneCurve::Photographic,
+    };
+    let radiance = gathered.require(picture::RADIANCE)?;
+    context.picture(GATHERED, &png::tone_mapped(radiance, side, &tone));
+    Ok(())
+}
+
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
+        write_pictures(context, &gpu)?;
         let scenes = context.first(&SCENES, 1);
         context.each(
             scenes,
@@ -185,14 +243,14 @@ impl Study for Found {
 
     fn findings(&self) -> Findings {
         let published = self.iter().find(|row| row.weight == DENSITY && row.radius == PUBLISHED);
-        Findings::of(self, CRITERIA)
+        let found = Findings::of(self, CRITERIA)
             .headline(
                 "light of discs of the published radius over that of all texels, in the Cornell box under a spot",
                 published.map(|row| row.kept.measured()),
             )
             .note(format!(
                 "{0} × {0} pixels, {1} frames with {2} samples of a disc, over the mean with {3} virtual lights a frame on the same views, which come through everything, too; as many seeds \
-                 as there are repeats. A point's views show what lies before them alone, so that discs lose what comes from behind their edges however large they are.",
+                 as there are repeats. A point's views show what lies before them alone, so that discs lose what comes from behind their edges however large they are; places beside a spot's cone are shown beside its view.",
                 FULL.side, FULL.frames, FULL.samples, FULL.lights
             ))
             .curves(
@@ -204,6 +262,18 @@ impl Study for Found {
                     |row| format!("{}, {}", row.scene, row.weight),
                     |row| (row.radius, row.kept.measured()),
                 ),
+            );
+        if self.is_empty() {
+            return found;
+        }
+        found
+            .picture(
+                DISC,
+                "400 samples of a disc, each as large as its weight: by the inverse of the density, and as published. They lie denser in the middle, and have more weight outside.",
+            )
+            .picture(
+                GATHERED,
+                "The Cornell box under a spot: what discs of the published radius gather of the light that is scattered once more.",
             )
     }
 }

@@ -13,8 +13,10 @@ use clerestory::transport::GpuScene;
 use clerestory::{Result, scene};
 use glam::{DVec3, Vec3};
 
+use super::vpl_receiver::{self, Receiver};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
+use crate::experiments::measures::pictures::{Panel, light_panel, mean_of, tiled};
 use crate::experiments::reference::short_name;
 
 /// Scenes, whether the lamp is a spot, where it begins and how far it goes on in a frame, as shares of the box around each.
@@ -43,7 +45,7 @@ const FULL: Form = Form {
     side: 48,
     lights: 256,
     map_side: 64,
-    frames: 24,
+    frames: 30,
     oracle: 65_536,
     every: 6,
 };
@@ -55,26 +57,31 @@ const SMOKE: Form = Form {
     oracle: 256,
     every: 2,
 };
-const RENEWED: u32 = 8;
+pub(super) const RENEWED: u32 = 8;
 /// The oracle's lights are none of those that it judges.
-const ORACLE_SEED: u32 = 1000;
+pub(super) const ORACLE_SEED: u32 = 1000;
+/// The last frames of all scenes, and of a body that moves: by kept lights, by new walks, and by the oracle.
+const SHOWN: &str = "moving.png";
+/// Pixels along a side that show one, and what is white over the mean.
+const ENLARGED: u32 = 4;
+const WHITE: f64 = 3.0;
 /// Frames of a lamp that stands still.
 const STILL: u32 = 8;
 /// Pictures of new walks behind the jump.
 const JUMP_SEEDS: u32 = 8;
-const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
+pub(super) const INDIRECT: &str = "bounces=2,lobes=diffuse+glossy";
 const KEPT: &str = "kept lights";
 const NEW: &str = "new walks";
 const WAYS: [(&str, Placement); 2] = [(KEPT, Placement::Incremental), (NEW, Placement::Walks)];
 
 #[derive(Clone, Copy)]
-struct Form {
-    side: u32,
-    lights: u32,
-    map_side: u32,
-    frames: u32,
-    oracle: u32,
-    every: u32,
+pub(super) struct Form {
+    pub side: u32,
+    pub lights: u32,
+    pub map_side: u32,
+    pub frames: u32,
+    pub oracle: u32,
+    pub every: u32,
 }
 
 rows! {
@@ -126,6 +133,7 @@ pub struct Found {
     moving: Vec<Row>,
     still: Vec<Still>,
     jumps: Vec<Jump>,
+    receivers: Vec<Receiver>,
 }
 
 const OF_PAIRS: &[Criterion<Pair>] = &[
@@ -241,7 +249,8 @@ impl Subject {
     }
 }
 
-fn renderer(
+/// Frames of it.
+pub(super) fn renderer(
     gpu: &Gpu,
     scene: &Arc<GpuScene>,
     subject: &Subject,
@@ -258,7 +267,7 @@ fn renderer(
 }
 
 /// A frame that begins a picture, and its milliseconds of wall clock.
-fn frame(renderer: &mut ManyLight, subject: &Subject, seed: Option<u32>) -> Result<(Vec<f32>, f64)> {
+pub(super) fn frame(renderer: &mut ManyLight, subject: &Subject, seed: Option<u32>) -> Result<(Vec<f32>, f64)> {
     match seed {
         Some(seed) => renderer.restart(seed)?,
         None => renderer.set_camera(&subject.scene.cameras[0])?,
@@ -271,10 +280,16 @@ fn frame(renderer: &mut ManyLight, subject: &Subject, seed: Option<u32>) -> Resu
 }
 
 /// Root of the mean squared difference, over the mean of the second.
-fn difference(a: &[f32], b: &[f32]) -> f64 {
+pub(super) fn difference(a: &[f32], b: &[f32]) -> f64 {
     let squares: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
     let sum: f64 = b.iter().map(|value| f64::from(*value)).sum();
     (squares * b.len() as f64).sqrt() / sum
+}
+
+/// Light side by side, as bright as the last one is.
+pub(super) fn side_by_side(all: [&[f32]; 3]) -> Vec<Panel> {
+    let white = WHITE * mean_of(all[2]).max(f64::MIN_POSITIVE);
+    all.map(|light| light_panel(light, white)).into()
 }
 
 /// What frames of a way have been.
@@ -288,7 +303,12 @@ struct Frames {
     last: Vec<f32>,
 }
 
-fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) -> Result<(Vec<Row>, Still, Jump)> {
+/// What was found, and panels of the last frame.
+fn of_scene(
+    context: &Context<'_>,
+    gpu: &Gpu,
+    case: (&str, bool, Vec3, Vec3),
+) -> Result<(Vec<Row>, Still, Jump, Vec<Panel>)> {
     let form = context.pick(FULL, SMOKE);
     let subject = Subject::new(case)?;
     let scene = Arc::new(GpuScene::new(gpu, &subject.scene)?);
@@ -315,6 +335,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) ->
     };
     let mut oracle = renderer(gpu, &scene, &subject, oracle, form)?;
     let mut found = [Frames::default(), Frames::default()];
+    let mut shown = Vec::new();
     // The first frame, of all lights, compiles kernels and does not count.
     for number in 0..=form.frames {
         scene.move_light(gpu, 0, &subject.lamp(number))?;
@@ -340,6 +361,9 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) ->
                 frames.renewed = frames.renewed.max(after.renewed - before.renewed);
             }
             frames.last = radiance;
+        }
+        if let Some(truth) = truth {
+            shown = side_by_side([&found[0].last, &found[1].last, &truth]);
         }
     }
     // Until all is settled, and then frames that count.
@@ -391,41 +415,59 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, bool, Vec3, Vec3)) ->
         rays: after.sight_rays - before.sight_rays,
         maps: after.maps - before.maps,
     };
-    Ok((rows.collect(), still, jump))
+    Ok((rows.collect(), still, jump, shown))
 }
 
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let (mut still, mut jumps) = (Vec::new(), Vec::new());
+        let (mut still, mut jumps, mut shown) = (Vec::new(), Vec::new(), Vec::new());
         let moving = context.each(
             context.first(&SCENES, 1),
             |(address, ..)| short_name(address).to_owned(),
             |case| {
-                let (rows, of_case, jump) = of_scene(context, &gpu, *case)?;
+                let (rows, of_case, jump, panels) = of_scene(context, &gpu, *case)?;
                 still.push(of_case);
                 jumps.push(jump);
+                shown.push(panels);
                 Ok(rows)
             },
         )?;
-        Ok(Self { moving, still, jumps })
+        let form = context.pick(FULL, SMOKE);
+        let (receiver, panels) = vpl_receiver::measure(&gpu, form)?;
+        shown.push(panels);
+        context.picture(SHOWN, &tiled([form.side; 2], ENLARGED, &shown));
+        Ok(Self {
+            moving,
+            still,
+            jumps,
+            receivers: vec![receiver],
+        })
     }
 
     fn findings(&self) -> Findings {
         let pairs = pairs(&self.moving);
-        Findings::of(&pairs, OF_PAIRS)
+        let all = Findings::of(&pairs, OF_PAIRS)
             .headline(
                 "time of frames with new walks over that of frames with kept lights, geometric mean of three scenes",
                 geometric_mean(pairs.iter().map(|pair| pair.faster)),
             )
             .and(Findings::of(&self.still, OF_STILL))
             .and(Findings::of(&self.jumps, OF_JUMPS))
+            .and(vpl_receiver::findings(&self.receivers))
             .and(Findings::of(&self.moving, &[]))
             .note(format!(
                 "{0} × {0} pixels, {1} virtual lights with exact maps of {2}² texels, four by four tiles and their filter; {3} frames in which the lamp goes on, behind a first one that places all lights. \
                  Ways take turns in each frame. A frame is wall clock, with the host's triangulations; new walks have another seed in each frame. Both ways have the bound and the filter of \
                  the defaults; the oracle's bound is that of its many lights, so that errors hold what bounds leave out.",
                 FULL.side, FULL.lights, FULL.map_side, FULL.frames,
-            ))
+            ));
+        if self.moving.is_empty() {
+            return all;
+        }
+        all.picture(
+            SHOWN,
+            "Indirect light of the last frame by kept lights, by new walks and by the oracle: a row a scene, and in the last one a block that has risen under a lamp that stands still.",
+        )
     }
 }

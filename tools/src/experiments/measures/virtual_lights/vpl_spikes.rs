@@ -74,6 +74,20 @@ const CRITERIA: &[Criterion<Row>] = &[
     )
     .among(|row| row.distance == TENTH),
     Criterion::each(
+        "a twentieth of the box leaves 2.4 to 3: greatest pixel over the 99th percentile",
+        Bound::Between(2.4, 3.0),
+        |row: &Row| row.spike.into(),
+    )
+    .among(|row| row.distance == TWENTIETH)
+    .because("the three seeds of the figures computed elsewhere"),
+    Criterion::each(
+        "a fifth of the box leaves 1.03: greatest pixel over the 99th percentile",
+        Bound::AtMost(1.1),
+        |row: &Row| row.spike.into(),
+    )
+    .among(|row| row.distance == FIFTH)
+    .because("to a tenth"),
+    Criterion::each(
         "a twentieth of the box loses 0.25 to 1.9 % of the light",
         Bound::Between(0.25, 1.9),
         |row: &Row| row.lost.into(),

@@ -1,0 +1,74 @@
+//! How many places that have stopped a submission of gathering goes on with.
+
+use std::cell::Cell;
+
+use super::gather::SOFTWARE_CONNECTIONS;
+use crate::gpu::{DeviceKind, Pace};
+
+/// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections.
+const PLACES_AT_ONCE: u32 = 1 << 12;
+
+/// As many as a driver that watches has time for, by what the last one took.
+pub(super) struct StoppedPace {
+    /// In units of [`PLACES_AT_ONCE`].
+    pace: Pace,
+    /// Units on software devices.
+    unwatched: u32,
+    /// Places of the submission that was recorded last, until its time is known.
+    recorded: Cell<u32>,
+}
+
+impl StoppedPace {
+    /// For places that take so many lights in a dispatch.
+    pub fn new(kind: DeviceKind, lights_at_once: u32) -> Self {
+        Self {
+            pace: Pace::new(kind, u32::MAX / PLACES_AT_ONCE),
+            unwatched: SOFTWARE_CONNECTIONS / (lights_at_once * PLACES_AT_ONCE),
+            recorded: Cell::new(0),
+        }
+    }
+
+    /// Of the next submission, in whole workgroups.
+    pub fn places(&self) -> u32 {
+        self.pace.units(PLACES_AT_ONCE, self.unwatched) * PLACES_AT_ONCE
+    }
+
+    /// A submission with so many of them has been recorded.
+    pub fn record(&self, places: u32) {
+        self.recorded.set(places);
+    }
+
+    /// A submission took so long, whether it went on with such places or not.
+    pub fn submitted(&mut self, seconds: f64) {
+        let places = self.recorded.take();
+        if places > 0 {
+            self.pace.submitted(seconds, u64::from(places));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_that_go_on_are_as_many_as_a_driver_has_time_for() {
+        let mut pace = StoppedPace::new(DeviceKind::Discrete, 64);
+        assert_eq!(pace.places(), PLACES_AT_ONCE);
+        // A submission of other stages says nothing of the pace of this one.
+        pace.submitted(1.0);
+        assert_eq!(pace.places(), PLACES_AT_ONCE);
+        let mut after = |places, seconds| {
+            pace.record(places);
+            pace.submitted(seconds);
+            pace.places()
+        };
+        // A quarter of a second each.
+        assert_eq!(after(PLACES_AT_ONCE, 1e-3), 250 * PLACES_AT_ONCE);
+        assert_eq!(after(250 * PLACES_AT_ONCE, 1.0), 62 * PLACES_AT_ONCE);
+        // Seconds for the least there is: no less is to be had.
+        assert_eq!(after(PLACES_AT_ONCE, 3.0), PLACES_AT_ONCE);
+        let software = |lights| StoppedPace::new(DeviceKind::Cpu, lights).places();
+        assert_eq!([64, 1].map(software), [1 << 13, 1 << 19]);
+    }
+}

@@ -1,0 +1,316 @@
+//! Scenes with media: virtual lights at collisions, and eye paths that gather at theirs.
+
+use super::*;
+use clerestory::Error;
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory::scene::{DensityGrid, Environment, Medium, Phase};
+use clerestory_tests::child::{hash_in_child, print_hash};
+use clerestory_tests::gpu;
+use glam::DVec3;
+
+/// Set in the processes that only print their picture's hash.
+const CHILD: &str = "CLERESTORY_TEST_PRINT_HASH_OF_FOG";
+const CHILD_TEST: &str = "media::prints_its_hash_when_asked";
+
+/// A medium whose bands come differently far.
+fn fog(phase: Phase) -> Medium {
+    Medium {
+        sigma_s: Vec3::new(0.4, 0.6, 0.9),
+        sigma_a: Vec3::new(0.2, 0.1, 0.05),
+        phase,
+        ..Medium::default()
+    }
+}
+
+/// The room, filled with it.
+fn fog_room(phase: Phase) -> Scene {
+    let mut scene = room();
+    scene.name = format!("fog with {phase:?}");
+    scene.media.push(fog(phase));
+    scene.surrounding = Some(0);
+    scene
+}
+
+/// The room, with a body of it behind an invisible boundary.
+fn fog_body(phase: Phase) -> Scene {
+    let mut scene = room();
+    scene.name = format!("body of fog with {phase:?}");
+    scene.media.push(Medium {
+        sigma_s: Vec3::new(2.0, 3.0, 4.0),
+        ..fog(phase)
+    });
+    let boundary = scene.add_material(Material {
+        name: "boundary".into(),
+        boundary: true,
+        interior: Some(0),
+        ..Material::default()
+    });
+    scene.place(cuboid(
+        "fog",
+        boundary,
+        Vec3::new(-0.2, -0.8, -0.7),
+        Vec3::new(0.6, 0.2, 0.3),
+    ));
+    scene
+}
+
+/// The body, with a density that changes across it, beside the same fog everywhere else if so wanted.
+fn cloud(around: bool) -> Scene {
+    let mut scene = fog_body(Phase::HenyeyGreenstein { g: 0.6 });
+    scene.name = format!("cloud, in fog: {around}");
+    let density = |p: DVec3| (2.0 * p.x * (0.5 + 0.5 * (7.0 * p.y).sin()) + 0.3 * p.z) as f32;
+    let grid = DensityGrid::from_fn([8, 12, 6], density);
+    scene.media[0].density = Some(grid.in_box(DVec3::new(-0.2, -0.8, -0.7), DVec3::new(0.6, 0.2, 0.3)));
+    if around {
+        scene.media.push(fog(Phase::Isotropic));
+        scene.surrounding = Some(1);
+    }
+    scene
+}
+
+fn several() -> VirtualLightSettings {
+    VirtualLightSettings {
+        samples_per_pass: 4,
+        ..settings()
+    }
+}
+
+/// Isotropic and forward, in all of space and in a body, with the bound that is chosen by default.
+#[test]
+fn lights_at_collisions_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let forward = Phase::HenyeyGreenstein { g: 0.6 };
+        for scene in [fog_room(Phase::Isotropic), fog_room(forward), fog_body(forward)] {
+            let found = passes(gpu, &scene, &several(), 48);
+            found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
+            assert!(found.counts.walks.events > 0, "{:?}", found.counts);
+        }
+    });
+}
+
+/// Delta tracking to collisions and ratio tracking between them, alone and beside a homogeneous medium.
+#[test]
+fn lights_in_grids_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        for scene in [cloud(false), cloud(true)] {
+            let found = passes(gpu, &scene, &several(), 48);
+            found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
+            assert!(found.counts.walks.events > 0, "{:?}", found.counts);
+        }
+    });
+}
+
+/// Walks start in a medium that emits, where nothing else does.
+#[test]
+fn media_that_emit_send_walks() {
+    with_gpu(|gpu| {
+        let mut scene = fog_body(Phase::Isotropic);
+        scene.name = "glowing body".into();
+        scene.lights.clear();
+        scene.media[0].emission = Vec3::new(3.0, 2.0, 1.0);
+        let found = passes(gpu, &scene, &several(), 48);
+        found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
+        assert!(found.counts.lights > 0, "{:?}", found.counts);
+    });
+}
+
+/// Bounds of both kinds about those that would be chosen, and a loose one, which leaves nothing to compensate.
+#[test]
+fn bounds_in_media_are_compensated() {
+    const LOOSE: f32 = 1e30;
+    with_gpu(|gpu| {
+        let scene = fog_room(Phase::Isotropic);
+        let reference = traced(gpu, &scene, 2048);
+        for (bound, bound_value) in [(Bound::Geometry, 0.1), (Bound::Geometry, 1.0), (Bound::Distance, 1.0)] {
+            let settings = VirtualLightSettings {
+                bound,
+                bound_value,
+                ..several()
+            };
+            let found = passes(gpu, &scene, &settings, 48);
+            found.expect_same_as(&format!("{bound:?} {bound_value}"), &reference, 0.0);
+        }
+        let of = |bound| {
+            let settings = VirtualLightSettings {
+                bound,
+                bound_value: LOOSE,
+                ..settings()
+            };
+            let mut renderer = renderer(gpu, &scene, SIZE, &settings);
+            let [radiance, _] = advance(&mut renderer, 4);
+            (radiance, renderer.counts().gather.gathers)
+        };
+        let ((unbounded, gathers), (loose, of_loose)) = (of(Bound::None), of(Bound::Geometry));
+        // Each sample gathers once, where it collides or arrives.
+        assert_eq!((gathers, of_loose), (u64::from(4 * SIDE * SIDE), gathers));
+        let most = unbounded.iter().copied().fold(0.0, f32::max);
+        for (found, expected) in loose.iter().zip(&unbounded) {
+            let allowed = 1e-5 * (expected + most);
+            assert!((found - expected).abs() <= allowed, "{found} {expected}");
+        }
+    });
+}
+
+/// A closed box of walls that emit and reflect half of what arrives, in fog that absorbs nothing: the same radiance everywhere.
+#[test]
+fn furnaces_with_fog_are_even() {
+    with_gpu(|gpu| {
+        let mut scene = builtin("builtin:furnace-box?rho=0.5&emission=1");
+        scene.media.push(Medium {
+            sigma_s: Vec3::splat(1.0),
+            phase: Phase::HenyeyGreenstein { g: 0.6 },
+            ..Medium::default()
+        });
+        scene.surrounding = Some(0);
+        let found = passes(gpu, &scene, &several(), 48);
+        for means in &found.means {
+            expect_mean_of("radiance", means, 2.0, 0.0, 0.0);
+        }
+    });
+}
+
+/// A glass ball in fog behind a boundary, lit by a lamp: no virtual light has what the glass sends into the fog.
+#[test]
+fn light_off_mirrors_into_media_is_the_eye_paths() {
+    with_gpu(|gpu| {
+        let scene = builtin("builtin:fog-box?sphere=glass&sigma_s=3");
+        let reference = traced(gpu, &scene, 1024);
+        passes(gpu, &scene, &several(), 48).expect_same_as("compensated", &reference, 0.0);
+        let unbounded = VirtualLightSettings {
+            walks: 32,
+            bound: Bound::None,
+            ..several()
+        };
+        // Without a bound single lights count without one, so that a few passes are not normal: means alone, with room for that.
+        passes(gpu, &scene, &unbounded, 48).expect_same_as("unbounded", &reference, 0.05);
+    });
+}
+
+#[test]
+fn walks_through_media_are_counted() {
+    with_gpu(|gpu| {
+        let absorbing = Medium {
+            sigma_s: Vec3::ZERO,
+            sigma_a: Vec3::splat(0.5),
+            ..Medium::default()
+        };
+        let mut dark = room();
+        dark.media.push(absorbing);
+        dark.surrounding = Some(0);
+        for (scene, scatters) in [
+            (fog_room(Phase::Isotropic), true),
+            (fog_body(Phase::Rayleigh), true),
+            (cloud(true), true),
+            (dark, false),
+        ] {
+            let settings = VirtualLightSettings {
+                walks: 1 << 10,
+                ..settings()
+            };
+            let mut renderer = renderer(gpu, &scene, SIZE, &settings);
+            let lights = renderer.lights(0).unwrap_or_else(|error| panic!("{error}"));
+            let c = renderer.counts().walks;
+            assert_eq!((c.emitted, c.escaped, c.absorbed), (1 << 10, 0, 1 << 10), "{c:?}");
+            assert_eq!(c.events, c.collisions, "{c:?}");
+            assert_eq!(lights.len() as u64, c.deposits + c.events, "{c:?}");
+            assert_eq!(c.events > 50, scatters, "{}: {c:?}", scene.name);
+            // Those at collisions have no normal, and lie within the room.
+            let collisions = lights.iter().filter(|light| light.normal == Vec3::ZERO);
+            assert_eq!(collisions.clone().count() as u64, c.events, "{}", scene.name);
+            for light in collisions {
+                assert!(
+                    light.position.abs().max_element() < 1.0 && light.power.max_element() > 0.0,
+                    "{light:?}"
+                );
+            }
+            // Of 20 W, of which the first lights have what fog has left; flights chosen by other bands weigh up to a third more or less.
+            let first: f32 = lights.iter().filter(|l| l.bounce == 0).map(|l| l.power.y).sum();
+            assert!(first > 0.0 && first <= 20.0 * 1.05, "{first}");
+        }
+    });
+}
+
+fn bits(picture: &[Vec<f32>; 2]) -> Vec<u32> {
+    picture.iter().flatten().map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn pictures_of_media_do_not_depend_on_how_work_is_shared_out() {
+    with_gpu(|gpu| {
+        for scene in [fog_body(Phase::Isotropic), cloud(true)] {
+            let base = VirtualLightSettings {
+                walks: 20,
+                ..settings()
+            };
+            let of = |settings: &VirtualLightSettings| {
+                let mut renderer = renderer(gpu, &scene, [13, 7], settings);
+                (bits(&advance(&mut renderer, 3)), renderer.counts())
+            };
+            let (whole, counts) = of(&base);
+            assert!(counts.gather.shadow_rays > 0);
+            for (lights_at_once, submission_work) in [(1, 0), (3, 0), (0, 1), (2, 64)] {
+                let settings = VirtualLightSettings {
+                    lights_at_once,
+                    submission_work,
+                    ..base.clone()
+                };
+                let (parted, parted_counts) = of(&settings);
+                let what = format!("{}: {lights_at_once} {submission_work}", scene.name);
+                assert_eq!(parted, whole, "{what}");
+                assert_eq!(parted_counts, counts, "{what}");
+            }
+        }
+    });
+}
+
+#[test]
+fn threads_of_the_driver_never_show_in_media() {
+    let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
+    let truth = hash(&[("LP_NUM_THREADS", "1")]);
+    assert_eq!(hash(&[("LP_NUM_THREADS", "2")]), truth);
+}
+
+#[test]
+fn prints_its_hash_when_asked() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    let gpu = gpu();
+    let mut renderer = renderer(&gpu, &cloud(true), SIZE, &settings());
+    print_hash(bits(&advance(&mut renderer, 2)));
+    clerestory_tests::assert_no_messages(&gpu);
+}
+
+#[test]
+fn what_media_have_no_lights_for_is_refused_by_name() {
+    with_gpu(|gpu| {
+        let mut sky = fog_room(Phase::Isotropic);
+        sky.environment = Some(Environment::uniform(Vec3::ONE));
+        let mut glowing = fog_room(Phase::Isotropic);
+        glowing.media[0].emission = Vec3::ONE;
+        let start = |scene: &Scene, settings: serde_json::Value| {
+            let options = RenderOptions {
+                technique: Some("vpl".into()),
+                settings: settings.into(),
+                ..RenderOptions::default()
+            };
+            let renderer = Renderer::new(gpu, scene).expect("scene");
+            renderer.start(&options).err().expect("a refusal")
+        };
+        for (scene, word) in [(sky, "light from infinity"), (glowing, "emits everywhere")] {
+            let error = start(&scene, serde_json::json!({}));
+            assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+            assert!(error.to_string().contains(word), "{error}");
+        }
+        let scene = fog_room(Phase::Isotropic);
+        for (settings, word) in [
+            (serde_json::json!({ "selection": "cuts" }), "selection: cuts"),
+            (serde_json::json!({ "selection": "potential" }), "selection: potential"),
+            (serde_json::json!({ "fractional": true }), "fractional: true"),
+            (serde_json::json!({ "compensation_steps": 2 }), "compensation_steps: 2"),
+        ] {
+            let error = start(&scene, settings).to_string();
+            assert!(error.contains(word) && error.contains("participating media"), "{error}");
+        }
+    });
+}

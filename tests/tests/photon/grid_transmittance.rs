@@ -1,0 +1,202 @@
+//! What grids leave of light along eye rays, by walks and by tables: against the integral of the density, ray by ray.
+//!
+//! A floor that a light beneath a grid lights is seen through the grid and beside it, by the same photons and rays: the ratio of both pictures is what each ray has left of light.
+
+use super::volume::{coloured, lit_box, uneven};
+use super::*;
+use clerestory::gpu::shaders::constants::WAY_PLACES;
+use clerestory::scene::{DensityGrid, Medium};
+use clerestory::techniques::photon_mapping::volume::transmittance::VolumeTransmittance;
+use clerestory_tests::statistics::expect_mean_of;
+use clerestory_tests::with_gpu;
+use glam::{DAffine3, DVec3};
+
+/// Extinction of a density of 1, 1/m; grids are a metre high.
+const SIGMA: [f32; 3] = [0.5, 1.0, 2.0];
+/// Rays of a pixel.
+const RAYS: u32 = 64;
+/// Faces of the grids, m.
+const LOW: f64 = 0.5;
+const HIGH: f64 = 1.5;
+
+/// Densities from below to above: waves that fill blocks of the bound unevenly; one dense cell; a layer thinner than the places of a table are apart, and midway between two of these.
+fn densities() -> [(&'static str, Vec<f32>); 3] {
+    let waves = (0..12).map(|i| 1.0 + 0.9 * (7.0 * (f64::from(i) + 0.5) / 12.0).sin() as f32);
+    let dense = |cells: usize, at: usize, background: f32, density: f32| {
+        let mut values = vec![background; cells];
+        values[at] = density;
+        values
+    };
+    [
+        ("waves", waves.collect()),
+        ("cell", dense(12, 5, 0.1, 9.0)),
+        ("layer", dense(1024, 512, 1.0, 1024.0)),
+    ]
+}
+
+fn grid(values: &[f32], aside: f64) -> DensityGrid {
+    let grid = DensityGrid {
+        size: [1, values.len() as u32, 1],
+        values: values.to_vec(),
+        to_world: DAffine3::IDENTITY,
+    };
+    grid.in_box(DVec3::new(aside - 1.0, LOW, -1.0), DVec3::new(aside + 1.0, HIGH, 1.0))
+}
+
+/// The floor with a grid over what is seen of it, or so far aside.
+fn floor_under(values: &[f32], aside: f64) -> Scene {
+    let mut scene = Scene {
+        name: "floor under a grid".into(),
+        ..Scene::default()
+    };
+    let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
+    scene.place(floor("floor", white, 1.5, 0.0));
+    scene.media.push(Medium {
+        sigma_a: Vec3::from_array(SIGMA),
+        density: Some(grid(values, aside)),
+        ..Medium::default()
+    });
+    scene.surrounding = Some(0);
+    scene.cameras.push(camera_down(0.3, 5.0));
+    add_point(&mut scene, Vec3::new(0.5, 0.3, 0.4), Vec3::splat(5.0));
+    scene
+}
+
+/// What pixels have left of light, on average of their rays, by band.
+fn left_by(gpu: &Gpu, values: &[f32], volume_transmittance: VolumeTransmittance) -> [Vec<f64>; 3] {
+    let settings = PhotonSettings {
+        photons: 1 << 10,
+        radius: 0.4,
+        volume_radius: 0.1,
+        samples_per_pass: RAYS,
+        direct_photons: true,
+        volume_transmittance,
+        ..settings("bounces=1..1")
+    };
+    let [through, beside] = [0.0, 100.0].map(|aside| photons(gpu, &floor_under(values, aside), &settings, RAYS));
+    std::array::from_fn(|band| {
+        let pixels = through.chunks(3).zip(beside.chunks(3));
+        pixels
+            .map(|(through, beside)| f64::from(through[band]) / f64::from(beside[band]))
+            .collect()
+    })
+}
+
+fn mean_of(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn walks_have_the_exact_transmittance_and_vary_less_than_delta_tracking() {
+    with_gpu(|gpu| {
+        for (name, values) in densities() {
+            let all = left_by(gpu, &values, VolumeTransmittance::Walk);
+            for (left, sigma) in all.iter().zip(SIGMA) {
+                // Lines between centres, with what lies beyond the outermost ones, have the mean of the cells.
+                let exact = (-f64::from(sigma) * grid(&values, 0.0).mean()).exp();
+                let what = format!("{name}, {sigma}/m");
+                expect_mean_of(&what, left, exact, 0.0, 1e-5 * exact);
+                let mean = mean_of(left);
+                let of_pixels = left.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (left.len() - 1) as f64;
+                // Delta tracking lets a ray's light pass, or nothing of it.
+                let (variance, delta) = (of_pixels * f64::from(RAYS), exact * (1.0 - exact));
+                println!("{what}: variance over that of delta tracking {:.3}", variance / delta);
+                assert!(variance < 0.9 * delta, "{what}: {variance}, by delta tracking {delta}");
+            }
+        }
+    });
+}
+
+#[test]
+fn tables_err_by_what_lies_between_their_places() {
+    with_gpu(|gpu| {
+        for ((name, values), bias) in densities().into_iter().zip([1e-4, 5e-3, f64::INFINITY]) {
+            let density = grid(&values, 0.0);
+            let spacing = (HIGH - LOW) / f64::from(WAY_PLACES);
+            let places = (0..WAY_PLACES).map(|i| HIGH - (f64::from(i) + 0.5) * spacing);
+            let depth: f64 = places.map(|y| density.density(DVec3::Y * y) * spacing).sum();
+            for (left, sigma) in left_by(gpu, &values, VolumeTransmittance::Table).iter().zip(SIGMA) {
+                let sigma = f64::from(sigma);
+                let (mean, what) = (mean_of(left), format!("{name}, {sigma}/m"));
+                let exact = (-sigma * density.mean()).exp();
+                println!(
+                    "{what}: {mean:.6}, exact {exact:.6}, error {:.2} %",
+                    (mean / exact - 1.0) * 100.0
+                );
+                // Each ray has the same, which is that of the middles: sums of 64 numbers, and an exponential.
+                let expected = (-sigma * depth).exp();
+                for value in left {
+                    assert!((value / expected - 1.0).abs() < 1e-4, "{what}: {value}, not {expected}");
+                }
+                assert!((mean / exact - 1.0).abs() < bias, "{what}: {mean} {exact}");
+            }
+            if name == "layer" {
+                // Half of the depth is missing.
+                assert!((depth / density.mean() - 0.5).abs() < 1e-3, "{depth}");
+            }
+        }
+    });
+}
+
+/// All that a grid scatters, seen by tables.
+fn tabulated(set: &str, photons: u32) -> PhotonSettings {
+    PhotonSettings {
+        volume_radius: 0.02,
+        radius: 0.1,
+        photons,
+        volume_transmittance: VolumeTransmittance::Table,
+        ..settings(set)
+    }
+}
+
+#[test]
+fn tables_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        // As walks do: what the table errs by is far less where density changes within a sixth of the way.
+        let scene = lit_box(uneven(coloured()));
+        expect_agreement(gpu, &scene, &tabulated("bounces=2..4", 1 << 14), [16, 1024], [2e-2; 3]);
+    });
+}
+
+#[test]
+fn tables_are_kept_for_queries_that_a_quota_stops() {
+    with_gpu(|gpu| {
+        let scene = lit_box(uneven(coloured()));
+        let of = |query_quota| {
+            let settings = PhotonSettings {
+                query_quota,
+                volume_radius: 0.05,
+                ..tabulated("all", 1 << 11)
+            };
+            let mut mapper = mapper(gpu, &scene, &settings);
+            let picture = advance(&mut mapper, 1);
+            (picture, mapper.counts().beams, mapper.eye_counters().stalls)
+        };
+        let (whole, beams, stalls) = of(32_768);
+        assert_eq!(stalls, 0);
+        let (stopped, stopped_beams, stalls) = of(64);
+        assert!(stalls > 0 && beams.queries > 0);
+        assert_eq!(stopped_beams, beams);
+        // Sums of some hundred kernels in another order.
+        for (i, (a, b)) in whole.iter().zip(&stopped).enumerate() {
+            assert!((a - b).abs() <= 1e-5 * a, "{i}: {b}, not {a}");
+        }
+    });
+}
+
+#[test]
+fn homogeneous_media_have_the_same_bits_by_either() {
+    with_gpu(|gpu| {
+        let of = |scene: &Scene, volume_transmittance| {
+            let settings = PhotonSettings {
+                volume_transmittance,
+                ..tabulated("all", 1 << 10)
+            };
+            bits(&photons(gpu, scene, &settings, 1))
+        };
+        for (scene, alike) in [(lit_box(coloured()), true), (lit_box(uneven(coloured())), false)] {
+            let both = [VolumeTransmittance::Walk, VolumeTransmittance::Table].map(|by| of(&scene, by));
+            assert_eq!(both[0] == both[1], alike, "{}", scene.name);
+        }
+    });
+}
