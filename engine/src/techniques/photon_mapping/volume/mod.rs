@@ -164,6 +164,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/volume/event.rs::boxes_hold_what_rays_find_within_the_radius",
             "tests/tests/twins/photons.rs::records_of_events_agree_with_their_twins",
             "tests/tests/photon/volume.rs::airlight_has_its_six_constants",
+            "tests/tests/photon/volume_kernels.rs::no_phase_function_is_mirrored",
+            "tests/tests/photon/volume_truths.rs::media_scatter_what_they_take_in_furnaces",
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
             "tests/tests/photon/volume.rs::grids_agree_with_the_path_tracer",
             "tests/tests/photon/volume.rs::glass_in_fog_agrees_with_the_path_tracer",
