@@ -32,6 +32,7 @@ const SMOKE_PHOTONS: u32 = 1 << 9;
 /// Each renderer's turns, and its pictures in each.
 const TURNS: usize = 5;
 const PICTURES: u32 = 3;
+const SMOKE_PICTURES: u32 = 2;
 /// Edges of a bidirectional path from either end at most: of all light that goes farther, next to nothing is seen.
 const EDGES: &str = "16";
 /// As many edges in all.
@@ -214,7 +215,9 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> R
     let turns = context.in_turns(TURNS, contenders, |i| {
         seed += PICTURES + 1;
         let Some(peer) = i.checked_sub(OURS.len()) else {
-            return Ok(our_turn(&renderer, &options(context, &OURS[i], seed), PICTURES)?.0);
+            let pictures = context.pick(PICTURES, SMOKE_PICTURES);
+            let (turn, _) = our_turn(&renderer, &options(context, &OURS[i], seed), pictures)?;
+            return Ok(turn);
         };
         if causes[peer].is_some() || context.watch.stopped() {
             return Ok(Turn::new());
