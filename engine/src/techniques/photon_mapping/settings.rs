@@ -77,9 +77,8 @@ pub enum MapQueue {
     Blocks,
 }
 
-/// In how many kernels eye paths get what photons in media give them, bounce by bounce.
-///
-/// Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.
+/// Whether the closest hits of eye rays, their ways through media and the queries along them are separate kernels (B. Fabianowski,
+/// "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4) or one (the engine's own).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapStages {
@@ -188,6 +187,8 @@ crate::settings! {
         pub queue: MapQueue = MapQueue::Slots;
         /// In scenes with media a kernel finds the closest hits of eye rays, and others their ways through media and what they see there, or one does all that; without media there is nothing to
         /// fuse. Never changes the picture. With slots and single queries alone, and not over a kd-tree.
+        ///
+        /// Compare both with `clerestory report volume-queues`; `fused` saves passes, and leaves what a quota stops to the separate kernels.
         pub stages: MapStages = MapStages::Stream;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.
