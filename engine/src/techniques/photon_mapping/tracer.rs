@@ -349,8 +349,8 @@ impl PhotonTracer {
         let traced = &mut tracing.traced;
         let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
         let [absorbed, events] = volume.unwrap_or_default();
-        let collided = self.kit.append.collisions().map(CollisionStage::counts).transpose()?;
-        let [collided, kept] = collided.unwrap_or_default();
+        let collisions = self.kit.append.collisions().map(CollisionStage::counts).transpose()?;
+        let collisions = collisions.unwrap_or_default();
         // What waits are the deposits with a kernel, and in scenes with media what comes from these besides.
         let records = match volume {
             Some(_) => counters.deposits - counters.without_kernel,
@@ -358,11 +358,11 @@ impl PhotonTracer {
         };
         traced.records = traced.records.saturating_add(records);
         traced.events = traced.events.saturating_add(events);
-        traced.counts.events += u64::from(events) + u64::from(kept);
+        traced.counts.events += u64::from(events) + u64::from(collisions.kept);
         traced.counts.collisions += walked.media.collisions;
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
-        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed) + u64::from(collided);
+        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed) + u64::from(collisions.absorbed);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
