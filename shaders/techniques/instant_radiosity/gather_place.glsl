@@ -74,11 +74,11 @@ bool begin_receiver(uint slot, uint place, out Receiver r) {
     }
     r.interior = arrival_interior(r.arrival, HAS_TRANSMISSION ? walk_gathered[slot].interior : OUTSIDE);
     r.throughput = absorbed(path.throughput, r.interior, hit.t);
-    if (EDGE_BOUND != EDGE_UNBOUNDED && path.pdf > 0.0) {
+    if (EDGE_BOUND != EDGE_UNBOUNDED) {
         // The path has come over an edge of whose light virtual lights bring what its bound leaves.
         float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
         float cos_here = abs(dot(path.direction, r.arrival.surface.geometric_normal));
-        r.throughput *= 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, hit.t * hit.t);
+        r.throughput *= share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, cos_here, hit.t * hit.t);
     }
     r.frame = scattering_frame(r.arrival, arrival_normal(r.arrival));
     return r.throughput != vec3(0.0);

@@ -95,11 +95,8 @@ bool counts_bounces(uint bounces) { return !COUNTS_BOUNCES || (bounces >= push.l
 
 // What virtual lights leave to be gathered at a distance of t from where the path was scattered last, whose light they have up to the bound.
 float gathered_share(uint slot, WalkState path, float cos_here, float t) {
-    if (EDGE_BOUND == EDGE_UNBOUNDED || !(path.pdf > 0.0)) {
-        return 1.0;
-    }
     float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
-    return 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, t * t);
+    return share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, cos_here, t * t);
 }
 
 // The walk of an eye path's ray through a grid, as path_medium.comp has it: with the same stops, where the path goes on with a way of its own.

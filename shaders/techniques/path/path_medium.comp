@@ -55,12 +55,9 @@ vec3 place_on_way(WalkState path, Way way, float t) { return path.origin + max(w
 
 // Share of what a collision scatters, t from where the path was scattered last, that is the path's own beside those of other means: all where that was a mirror, or nowhere.
 float own_share(uint slot, WalkState path, float t) {
-    if (EDGE_BOUND == EDGE_UNBOUNDED || !(path.pdf > 0.0)) {
-        return 1.0;
-    }
     // There is no cosine at the collision.
     float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? path_departures[slot] : 1.0;
-    return 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, 1.0, t * t);
+    return share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, 1.0, t * t);
 }
 
 // Weight of light sampling of density `light_pdf` (0: of a light without extent) against the phase function's directions, which meet the light, too.

@@ -108,10 +108,10 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     }
     // What is scattered here by other lobes than mirrors, of light that came over an edge whose other end scattered by such, is shared.
     float share = 1.0;
-    if (EDGE_BOUND != EDGE_UNBOUNDED && path.pdf > 0.0) {
+    if (EDGE_BOUND != EDGE_UNBOUNDED) {
         float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? path_departures[slot] : 1.0;
         float cos_here = abs(dot(path.direction, s.geometric_normal));
-        share = 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, hit.t * hit.t);
+        share = share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, cos_here, hit.t * hit.t);
         mask &= share > 0.0 ? LOBE_ALL : LOBE_SPECULAR;
         lit_mask &= mask;
     }
