@@ -99,7 +99,7 @@ vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s,
 // Share of a record's light that eye paths which go on leave to photons, by the density of its phase function.
 float photons_share(uvec4 q2, float phase, float sine, bool has_beams) {
     float even2 = even_distance2(phase, sine, mean_extinction(beam.m.sigma_t), push.radius, push.photons, has_beams);
-    return photon_share(unpack_light(q2), even2);
+    return photon_share(unpack_light_distance2(q2), even2);
 }
 
 // Adds a beam's light where the ray passes it.
@@ -116,7 +116,7 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
             float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
             float phase = phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
             weight *= phase;
-            if (TELLS_LIGHTS) {
+            if (CARRIES_LIGHT_DISTANCE) {
                 weight *= photons_share(q2, phase, at.sine, true);
             }
             if (POINTS) {
@@ -194,7 +194,7 @@ bool compact_visit_beam(uint record) {
             if (POINTS && !(HAS_GRIDS && beam.m.has_grid != 0u)) {
                 weight *= share_of_points(unpack_flight(q2), sine);
             }
-            if (TELLS_LIGHTS) {
+            if (CARRIES_LIGHT_DISTANCE) {
                 weight *= photons_share(q2, phase, sine, !(HAS_GRIDS && beam.m.has_grid != 0u));
             }
             ++gathered_events;

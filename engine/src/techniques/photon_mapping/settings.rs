@@ -383,7 +383,7 @@ impl PhotonSettings {
             even_survival: false,
             stores_lights: false,
             only_rough: false,
-            tells_lights: has_media && self.volume_paths,
+            carries_light_distance: has_media && self.volume_paths,
             stored: self.stored(),
         }
     }

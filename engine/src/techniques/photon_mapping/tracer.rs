@@ -117,8 +117,8 @@ struct Kit {
     stored: Stored,
     /// Of a pass.
     photons: u32,
-    /// [`PhotonPlan::tells_lights`].
-    tells_lights: bool,
+    /// [`PhotonPlan::carries_light_distance`].
+    carries_light_distance: bool,
     append: Box<dyn Append>,
     emit: ComputePipeline<photon_emit::Kernel>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
@@ -173,7 +173,7 @@ impl PhotonTracer {
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
             only_rough: plan.only_rough,
-            tells_lights: plan.tells_lights,
+            carries_light_distance: plan.carries_light_distance,
             even_survival: plan.even_survival,
             has_media: profile.media.any(),
             has_classes: classes.is_some(),
@@ -233,7 +233,7 @@ impl PhotonTracer {
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
-                tells_lights: plan.tells_lights,
+                carries_light_distance: plan.carries_light_distance,
                 append,
             },
             gpu: gpu.clone(),
@@ -411,7 +411,7 @@ impl Kit {
     /// What photons of light without a place carry, m²; 0 where none tell their light.
     fn placeless2(&self) -> f32 {
         let [lower, upper] = self.scene.bounds().map(|corner| corner.as_dvec3());
-        if self.tells_lights {
+        if self.carries_light_distance {
             placeless_distance2(lower, upper) as f32
         } else {
             0.0
