@@ -17,8 +17,8 @@ float even_distance2(float phase, float sine, float extinction, float radius, fl
 }
 
 // Share of eye paths in light of that squared distance, and that of photons, which is what they leave. Neither divides by what is not positive, nor is one of infinities no number.
-float eye_share(float light2, float even2) { return light2 > 0.0 ? 1.0 / (1.0 + even2 / light2) : 0.0; }
-float photon_share(float light2, float even2) { return light2 > 0.0 ? 1.0 / (1.0 + light2 / even2) : 1.0; }
+float eye_share(float light2, float even_distance2) { return light2 > 0.0 ? 1.0 / (1.0 + even_distance2 / light2) : 0.0; }
+float photon_share(float light2, float even_distance2) { return light2 > 0.0 ? 1.0 / (1.0 + light2 / even_distance2) : 1.0; }
 
 // Stands for the squared distance of light without a place: from infinity, or that a medium emits; by the box of the scene, m2.
 float placeless_distance2(vec3 lower, vec3 upper) {

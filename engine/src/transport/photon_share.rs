@@ -32,18 +32,18 @@ pub fn even_distance2(phase: f64, sine: f64, extinction: f64, radius: f64, photo
 }
 
 /// Share of eye paths in light whose squared distance from its first scattering is `light2`, m², in \[0, 1\].
-pub fn eye_share(light2: f64, even2: f64) -> f64 {
+pub fn eye_share(light2: f64, even_distance2: f64) -> f64 {
     if light2 > 0.0 {
-        1.0 / (1.0 + even2 / light2)
+        1.0 / (1.0 + even_distance2 / light2)
     } else {
         0.0
     }
 }
 
 /// That of photons: what eye paths leave.
-pub fn photon_share(light2: f64, even2: f64) -> f64 {
+pub fn photon_share(light2: f64, even_distance2: f64) -> f64 {
     if light2 > 0.0 {
-        1.0 / (1.0 + light2 / even2)
+        1.0 / (1.0 + light2 / even_distance2)
     } else {
         1.0
     }

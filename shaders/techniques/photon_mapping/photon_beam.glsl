@@ -98,8 +98,8 @@ vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s,
 
 // Share of a record's light that eye paths which go on leave to photons, by the density of its phase function.
 float photons_share(uvec4 q2, float phase, float sine, bool has_beams) {
-    float even2 = even_distance2(phase, sine, mean_extinction(beam.m.sigma_t), push.radius, push.photons, has_beams);
-    return photon_share(unpack_light_distance2(q2), even2);
+    float extinction = mean_extinction(beam.m.sigma_t);
+    return photon_share(unpack_light_distance2(q2), even_distance2(phase, sine, extinction, push.radius, push.photons, has_beams));
 }
 
 // Adds a beam's light where the ray passes it.
