@@ -18,10 +18,10 @@
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Squared distance of a light, m², of whose light photons and eye paths have half each.
+/// Squared distance of a light, m², at which eye paths and photons each have half of its light.
 ///
-/// The eye path is scattered first with this density of its phase function, sr⁻¹, into a direction at this sine to the one before, in a medium of this mean extinction, m⁻¹; so many photons of
-/// a pass are seen there within a radius, m, as collisions and, where there are some, as beams.
+/// `phase`: density of the phase function, sr⁻¹; `sine`: of the angle between both directions at the eye path's first scattering; `extinction`: mean over bands, m⁻¹; `radius`: of kernels, m;
+/// `photons`: of a pass, which are seen there as collisions and, with `has_beams`, as beams.
 pub fn even_distance2(phase: f64, sine: f64, extinction: f64, radius: f64, photons: f64, has_beams: bool) -> f64 {
     let of_beams = if has_beams {
         2.0 * radius * sine / extinction
