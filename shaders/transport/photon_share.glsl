@@ -16,7 +16,7 @@ float even_distance2(float phase, float sine, float extinction, float radius, fl
     return photons * across / (16.0 * PI * PI * phase);
 }
 
-// Share of eye paths in light of that squared distance, and that of photons, which is what they leave. Neither divides by what is not positive, and infinite arguments give no NaN.
+// Share of eye paths in light of that squared distance, and that of photons, which is what they leave. Neither divides by what is not positive, and an infinite argument gives no NaN.
 float eye_share(float light2, float even_distance2) { return light2 > 0.0 ? 1.0 / (1.0 + even_distance2 / light2) : 0.0; }
 float photon_share(float light2, float even_distance2) { return light2 > 0.0 ? 1.0 / (1.0 + light2 / even_distance2) : 1.0; }
 
