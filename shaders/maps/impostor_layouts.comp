@@ -7,7 +7,7 @@
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
-#include "maps/directional_map.glsl"
+#include "maps/impostor_encode.glsl"
 
 // Whether one over the distance is the fourth number of a texel, instead of in a buffer of its own.
 layout(constant_id = 135) const bool IMPOSTOR_PACKED = false;
@@ -38,7 +38,7 @@ float impostor_look_up(uint layer, vec3 l, float size);
 // The texel that shows a direction of any length.
 int impostor_texel(vec3 l, float size) {
     uint face;
-    vec2 uv = directional_encode(DIRECTIONAL_KIND == DIRECTIONAL_EQUAL_AREA && size > 0.0 ? l / size : l, face);
+    vec2 uv = impostor_encode(l, size, face);
     ivec2 p = clamp(ivec2(uv * vec2(push.size)), ivec2(0), push.size - 1);
     return (int(face) * push.size.y + p.y) * push.size.x + p.x;
 }

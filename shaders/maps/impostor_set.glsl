@@ -2,7 +2,7 @@
 #ifndef CLERESTORY_MAPS_IMPOSTOR_SET_GLSL
 #define CLERESTORY_MAPS_IMPOSTOR_SET_GLSL
 
-#include "maps/directional_map.glsl"
+#include "maps/impostor_encode.glsl"
 #include "maps/packed_direction.glsl"
 
 // descriptor set 1: ImpostorSet
@@ -33,8 +33,7 @@ vec2 impostor_extent = impostor_shapes[0].extent;
 
 float impostor_look_up(uint layer, vec3 l, float size) {
     uint face;
-    // The other maps' directions may have any length.
-    vec2 uv = directional_encode(DIRECTIONAL_KIND == DIRECTIONAL_EQUAL_AREA && size > 0.0 ? l / size : l, face);
+    vec2 uv = impostor_encode(l, size, face);
     ivec2 p = min(ivec2(uv * vec2(impostor_size)), impostor_size - 1);
     bool is_cube = DIRECTIONAL_KIND == DIRECTIONAL_CUBE;
     int row = int(layer * (is_cube ? CUBE_FACES : 1u) + face) * impostor_size.y + p.y;

@@ -22,4 +22,10 @@ float bounded_share(uint kind, float bound, float cos_a, float cos_b, float squa
     return kept;
 }
 
+// What other means that have the light of an edge up to a bound leave of it, in [0, 1]: all where there is no bound, or where the scattering at the edge's far end
+// was a mirror's, of density 0.
+float share_beyond(uint kind, float bound, float pdf, float cos_there, float cos_here, float squared) {
+    return kind != EDGE_UNBOUNDED && pdf > 0.0 ? 1.0 - bounded_share(kind, bound, cos_there, cos_here, squared) : 1.0;
+}
+
 #endif

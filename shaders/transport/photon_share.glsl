@@ -6,8 +6,8 @@
 
 float mean_extinction(vec3 sigma_t) { return (sigma_t.x + sigma_t.y + sigma_t.z) / 3.0; }
 
-// Squared distance of a light, m2, of whose light photons and eye paths have half each: where the eye path is scattered first into a direction with this density and at this sine to the one
-// before, and so many photons of a pass are seen there within a radius as collisions and, where there are some, as beams.
+// Squared distance of a light, m2, at which eye paths and photons each have half of its light. `phase`: density of the phase function, 1/sr; `sine`: of the angle between both directions at the
+// eye path's first scattering; `extinction`: mean over bands, 1/m; `radius`: of kernels, m; `photons`: of a pass, which are seen there as collisions and, with `has_beams`, as beams.
 float even_distance2(float phase, float sine, float extinction, float radius, float photons, bool has_beams) {
     float across = PI * radius * radius;
     if (has_beams) {
@@ -16,9 +16,9 @@ float even_distance2(float phase, float sine, float extinction, float radius, fl
     return photons * across / (16.0 * PI * PI * phase);
 }
 
-// Share of eye paths in light of that squared distance, and that of photons, which is what they leave. Neither divides by what is not positive, nor is one of infinities no number.
-float eye_share(float light2, float even2) { return light2 > 0.0 ? 1.0 / (1.0 + even2 / light2) : 0.0; }
-float photon_share(float light2, float even2) { return light2 > 0.0 ? 1.0 / (1.0 + light2 / even2) : 1.0; }
+// Share of eye paths in light of that squared distance, and that of photons, which is what they leave. Neither divides by what is not positive, and an infinite argument gives no NaN.
+float eye_share(float light2, float even_distance2) { return light2 > 0.0 ? 1.0 / (1.0 + even_distance2 / light2) : 0.0; }
+float photon_share(float light2, float even_distance2) { return light2 > 0.0 ? 1.0 / (1.0 + light2 / even_distance2) : 1.0; }
 
 // Stands for the squared distance of light without a place: from infinity, or that a medium emits; by the box of the scene, m2.
 float placeless_distance2(vec3 lower, vec3 upper) {

@@ -21,13 +21,14 @@ layout(constant_id = 28) const bool NUMBERED = false;
 #define CLERESTORY_NUMBERED NUMBERED
 
 // Where an earlier dispatch has handled a part of the places, as walk_resume says: rays of some have ended, or some are further on than that (PLACE_RAY_ENDED).
+const uint GOES_ON_NOT = 0u;  // no place has begun
 const uint GOES_ON_RAYS = 1u;
 const uint GOES_ON_FURTHER = 2u;
 
 layout(push_constant, scalar) uniform Push {
     WalkKey key;
     uint surrounding;  // index of the medium outside all bodies, or NO_MEDIUM
-    uint goes_on;      // GOES_ON_*, or 0 where no place is begun
+    uint goes_on;      // GOES_ON_*
 } push;
 
 #include "transport/attribute_features.glsl"

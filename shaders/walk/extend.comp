@@ -17,7 +17,7 @@ void main() {
     if (status.stalled == STALLED_SHADOW || place >= status.active_count) {
         return;
     }
-    uint resume = push.goes_on != 0u ? walk_resume[place] : INDEX_START;
+    uint resume = push.goes_on != GOES_ON_NOT ? walk_resume[place] : INDEX_START;
     if (resume == INDEX_FINISHED || (push.goes_on == GOES_ON_FURTHER && resume >= PLACE_RAY_ENDED)) {
         return;
     }

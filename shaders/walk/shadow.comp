@@ -35,7 +35,7 @@ void main() {
     if (status.stalled == STALLED_EXTEND || place >= status.waiting_count) {
         return;
     }
-    uint resume = push.goes_on != 0u ? walk_resume[place] : INDEX_START;
+    uint resume = push.goes_on != GOES_ON_NOT ? walk_resume[place] : INDEX_START;
     if (resume == INDEX_FINISHED) {
         return;
     }

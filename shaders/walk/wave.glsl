@@ -75,7 +75,8 @@ struct WalkState {
     vec3 direction;   // unit
     uint bounce;      // scattering events so far
     vec3 throughput;
-    float pdf;        // of the direction, solid angle; 0 after a delta lobe or at the start: emission then counts in full
+    float pdf;        // of the direction, solid angle; 0 after a delta lobe or at the start: emission then counts in full. Of photons instead the squared distance of
+                      // their light, m2 (CARRIES_LIGHT_DISTANCE), or what they come from (PHOTON_FROM_...)
 };
 
 struct GatheredLight {

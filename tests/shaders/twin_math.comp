@@ -15,6 +15,7 @@ const bool SEPARABLE_MASKING = false;
 #include "techniques/instant_radiosity/history.glsl"
 #include "techniques/instant_radiosity/interleave.glsl"
 #include "techniques/instant_radiosity/resampling.glsl"
+#include "transport/densest_band.glsl"
 #include "transport/edge_bound.glsl"
 #include "transport/fresnel.glsl"
 #include "transport/ggx.glsl"
@@ -216,6 +217,15 @@ void main() {
             out_bits(i, resample(in1(2u * i), in1(2u * i + 1u), sum) ? 1u : 0u);
             out1(8u + i, sum);
         }
+        break;
+    }
+    case 19u: {  // flights by the densest band
+        FreeFlight f = densest_band_flight(in3(0u), in3(3u), in1(6u), in1(7u));
+        out1(0u, f.t);
+        out_bits(1u, f.collides ? 1u : 0u);
+        out3(2u, f.weight);
+        out3(5u, densest_band(in3(3u)));
+        out3(8u, passed_second_moment(in3(3u), in3(9u), in1(8u)));
         break;
     }
     }

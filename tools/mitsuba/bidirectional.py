@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Renders an exported scene by LuxCore's bidirectional path tracer (BIDIRCPU), or its path tracer, and prints as JSON how long it took.
 
-It takes scenes of diffuse surfaces and area lights. Each picture has samples of its own; all are written one behind the other to a file, three values
-of 32 bits a pixel, the top row first.
+It takes scenes of diffuse surfaces and area lights, with --clear also of smooth glass and of homogeneous media that scatter alike in all directions. Each
+picture has samples of its own; all are written one behind the other to a file, three values of 32 bits a pixel, the top row first.
 
 Printed: version; of each picture but a first one that does not count: seconds of rendering.
 """
@@ -26,6 +26,9 @@ def parse_arguments():
     parser.add_argument("--samples", type=int, default=16, help="of a pixel (default %(default)s)")
     parser.add_argument("--pictures", type=int, default=3, help="that count (default %(default)s)")
     parser.add_argument("--engine", choices=["BIDIRCPU", "PATHCPU"], default="BIDIRCPU", help="(default %(default)s)")
+    parser.add_argument("--depth", type=int, default=DEPTH, help="edges of a path from either end at most (default %(default)s)")
+    parser.add_argument("--clear", action="store_true", help="take glass and media too")
+    parser.add_argument("--no-roulette", action="store_true", help="follow all paths to the depth")
     parser.add_argument("--seed", type=int, default=1, help="of the first picture (default %(default)s)")
     return parser.parse_args()
 
@@ -36,10 +39,12 @@ def render(pyluxcore, scene, arguments, seed):
         "renderengine.type": arguments.engine,
         "renderengine.seed": seed,
         "sampler.type": "RANDOM",
-        "path.maxdepth": DEPTH,
-        "light.maxdepth": DEPTH,
-        "path.pathdepth.total": DEPTH,
-        "path.pathdepth.diffuse": DEPTH,
+        "path.maxdepth": arguments.depth,
+        "light.maxdepth": arguments.depth,
+        "path.pathdepth.total": arguments.depth,
+        "path.pathdepth.diffuse": arguments.depth,
+        "path.pathdepth.glossy": arguments.depth,
+        "path.pathdepth.specular": arguments.depth,
         "film.width": arguments.size,
         "film.height": arguments.size,
         "film.filter.type": "NONE",
@@ -51,6 +56,8 @@ def render(pyluxcore, scene, arguments, seed):
         "film.outputs.0.filename": "unused.exr",
         "batch.haltspp": arguments.samples,
     }
+    if arguments.no_roulette:
+        settings["path.russianroulette.cap"] = 1.0
     properties = pyluxcore.Properties()
     for key, value in settings.items():
         properties.Set(pyluxcore.Property(key, value))
@@ -81,7 +88,7 @@ def main():
     from photons import luxcore_scene
 
     pyluxcore.Init(lambda line: None)
-    scene = luxcore_scene(pyluxcore, arguments.scene)
+    scene = luxcore_scene(pyluxcore, arguments.scene, arguments.clear)
     seconds = []
     with open(arguments.pictures_file, "wb") as file:
         for picture in range(arguments.pictures + 1):

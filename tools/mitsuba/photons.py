@@ -60,16 +60,69 @@ def trace_with_mitsuba(arguments):
     }
 
 
-def luxcore_scene(pyluxcore, path):
-    """The exported scene, of diffuse surfaces and area lights."""
+def numbers(element):
+    return [float(word) for word in element.get("value").split()]
+
+
+def put_volume(put, name, index_of_refraction, absorption=(0.0, 0.0, 0.0), scattering=(0.0, 0.0, 0.0)):
+    """A volume of LuxCore's that scatters alike in all directions, or not at all."""
+    scatters = any(scattering)
+    put(f"scene.volumes.{name}.type", "homogeneous" if scatters else "clear")
+    put(f"scene.volumes.{name}.ior", index_of_refraction)
+    put(f"scene.volumes.{name}.absorption", list(absorption))
+    if scatters:
+        put(f"scene.volumes.{name}.scattering", list(scattering))
+        put(f"scene.volumes.{name}.asymmetry", [0.0] * 3)
+        put(f"scene.volumes.{name}.multiscattering", 1)
+
+
+def put_media(put, root):
+    """The scene's media, and air; the name of the last medium, if there is one."""
+    put_volume(put, "air", 1.0)
+    last = None
+    for medium in root.findall("medium"):
+        if medium.get("type") != "homogeneous" or medium.find("phase").get("type") != "isotropic":
+            sys.exit("media with a grid or a direction are not carried over")
+        scale = float(medium.find("float[@name='scale']").get("value"))
+        extinction = [scale * value for value in numbers(medium.find("rgb[@name='sigma_t']"))]
+        scattering = [t * a for t, a in zip(extinction, numbers(medium.find("rgb[@name='albedo']")))]
+        last = medium.get("id")
+        put_volume(put, last, 1.0, [t - s for t, s in zip(extinction, scattering)], scattering)
+    return last
+
+
+def put_clear(put, index, shape):
+    """Smooth glass or an invisible boundary, with what lies on both of its sides; whether the shape is one."""
+    kinds = {bsdf.get("type") for bsdf in shape.iter("bsdf")}
+    if kinds not in ({"null"}, {"dielectric"}):
+        return False
+    material = f"scene.materials.m{index}"
+    sides = {side.get("name"): side.get("id") for side in shape.findall("ref")}
+    inside = sides.get("interior", "air")
+    if kinds == {"dielectric"}:
+        inside = f"glass{index}"
+        put_volume(put, inside, float(shape.find("bsdf/float[@name='int_ior']").get("value")))
+        put(f"{material}.type", "glass")
+        put(f"{material}.kr", [1.0] * 3)
+        put(f"{material}.kt", [1.0] * 3)
+    else:
+        put(f"{material}.type", "null")
+    put(f"{material}.volume.interior", inside)
+    put(f"{material}.volume.exterior", sides.get("exterior", "air"))
+    return True
+
+
+def luxcore_scene(pyluxcore, path, clear=False):
+    """The exported scene, of diffuse surfaces and area lights.
+
+    With `clear` also of smooth glass and of media without a grid that scatter alike in all directions; all lights then lie in the last medium, since
+    light there begins in the volume that its surface names.
+    """
     root = xml.etree.ElementTree.parse(path).getroot()
     properties = pyluxcore.Properties()
 
     def put(key, value):
         properties.Set(pyluxcore.Property(key, value))
-
-    def numbers(element):
-        return [float(word) for word in element.get("value").split()]
 
     matrix = numbers(root.find("sensor/transform/matrix"))
     position = [matrix[3], matrix[7], matrix[11]]
@@ -80,7 +133,13 @@ def luxcore_scene(pyluxcore, path):
     put("scene.camera.fieldofview", float(root.find("sensor/float[@name='fov']").get("value")))
     if root.find("emitter") is not None:
         sys.exit("lights without area are not carried over")
+    medium = put_media(put, root) if clear else None
     for index, shape in enumerate(root.findall("shape")):
+        name = shape.find("string[@name='filename']").get("value")
+        put(f"scene.objects.o{index}.ply", os.path.join(os.path.dirname(path), name))
+        put(f"scene.objects.o{index}.material", f"m{index}")
+        if clear and put_clear(put, index, shape):
+            continue
         kinds = {bsdf.get("type") for bsdf in shape.iter("bsdf")}
         colour = shape.find(".//bsdf[@type='diffuse']/rgb[@name='reflectance']")
         if not kinds <= {"diffuse", "twosided"} or colour is None:
@@ -90,9 +149,8 @@ def luxcore_scene(pyluxcore, path):
         radiance = shape.find("emitter[@type='area']/rgb")
         if radiance is not None:
             put(f"scene.materials.m{index}.emission", numbers(radiance))
-        name = shape.find("string[@name='filename']").get("value")
-        put(f"scene.objects.o{index}.ply", os.path.join(os.path.dirname(path), name))
-        put(f"scene.objects.o{index}.material", f"m{index}")
+        if medium:
+            put(f"scene.materials.m{index}.volume.exterior", medium)
     scene = pyluxcore.Scene()
     scene.Parse(properties)
     return scene

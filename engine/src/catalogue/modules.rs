@@ -89,6 +89,7 @@ pub(super) const MODULES: &[&[Row]] = &[
     crate::scene::texture::ROWS,
     crate::transport::albedo::ROWS,
     crate::transport::bsdf::ROWS,
+    crate::transport::densest_band::ROWS,
     crate::transport::differentials::ROWS,
     crate::transport::differentials::path_differentials::ROWS,
     crate::transport::distribution::ROWS,

@@ -3,6 +3,7 @@
 pub mod albedo;
 pub mod bsdf;
 pub mod choice;
+pub mod densest_band;
 pub mod differentials;
 pub mod distribution;
 pub mod edge_bound;

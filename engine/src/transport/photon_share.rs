@@ -18,10 +18,10 @@
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Squared distance of a light, m², of whose light photons and eye paths have half each.
+/// Squared distance of a light, m², at which eye paths and photons each have half of its light.
 ///
-/// The eye path is scattered first with this density of its phase function, sr⁻¹, into a direction at this sine to the one before, in a medium of this mean extinction, m⁻¹; so many photons of
-/// a pass are seen there within a radius, m, as collisions and, where there are some, as beams.
+/// `phase`: density of the phase function, sr⁻¹; `sine`: of the angle between both directions at the eye path's first scattering; `extinction`: mean over bands, m⁻¹; `radius`: of kernels, m;
+/// `photons`: of a pass, which are seen there as collisions and, with `has_beams`, as beams.
 pub fn even_distance2(phase: f64, sine: f64, extinction: f64, radius: f64, photons: f64, has_beams: bool) -> f64 {
     let of_beams = if has_beams {
         2.0 * radius * sine / extinction
@@ -32,18 +32,18 @@ pub fn even_distance2(phase: f64, sine: f64, extinction: f64, radius: f64, photo
 }
 
 /// Share of eye paths in light whose squared distance from its first scattering is `light2`, m², in \[0, 1\].
-pub fn eye_share(light2: f64, even2: f64) -> f64 {
+pub fn eye_share(light2: f64, even_distance2: f64) -> f64 {
     if light2 > 0.0 {
-        1.0 / (1.0 + even2 / light2)
+        1.0 / (1.0 + even_distance2 / light2)
     } else {
         0.0
     }
 }
 
 /// That of photons: what eye paths leave.
-pub fn photon_share(light2: f64, even2: f64) -> f64 {
+pub fn photon_share(light2: f64, even_distance2: f64) -> f64 {
     if light2 > 0.0 {
-        1.0 / (1.0 + light2 / even2)
+        1.0 / (1.0 + light2 / even_distance2)
     } else {
         1.0
     }

@@ -20,10 +20,9 @@ pub trait ArrivalStage {
         false
     }
 
-    /// Records the closest hits of all places together with what [`record`](ArrivalStage::record) does there, in place of both the walker's stage and that: the first
-    /// time in a bounce, of a stage that [`finds_hits`](ArrivalStage::finds_hits). Places that it does not end at stall the wave with `STALLED_EXTEND`, as those of
-    /// `walk/extend.comp` do; `walk_resume` says where their rays go on, or, from `PLACE_RAY_ENDED` on, how far they are beyond that. The bounce then goes on by the walker's
-    /// stage and by `record`.
+    /// Records, in place of the walker's closest-hit stage and of [`record`](ArrivalStage::record), one pass that does both; called once in a bounce, before any of its
+    /// places has begun. Unfinished places stall the wave with `STALLED_EXTEND`; `walk_resume` then holds where the ray's search goes on, or a value from
+    /// `PLACE_RAY_ENDED` on where the ray has ended and the rest has not. The bounce goes on by the walker's stage and `record`.
     ///
     /// # Errors
     /// Those of recording, and [`Error::Internal`](crate::Error::Internal) for a stage that finds none.

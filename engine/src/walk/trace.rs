@@ -5,7 +5,7 @@
 use super::walker::WalkOptions;
 use super::wave::{WaveBuffers, stage_barrier};
 use crate::Result;
-use crate::gpu::shaders::constants::{GOES_ON_RAYS, NO_MEDIUM, WORK_UNIT};
+use crate::gpu::shaders::constants::{GOES_ON_NOT, GOES_ON_RAYS, NO_MEDIUM, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
 use crate::gpu::shaders::walk::{extend, shadow};
@@ -110,7 +110,7 @@ impl TracePipelines {
         std::iter::once(self.extend.info()).chain(shadow).collect()
     }
 
-    /// The closest hits of a wave's rays; `goes_on` is one of the kernel's `GOES_ON_*`, or 0.
+    /// The closest hits of a wave's rays; `goes_on` is one of the kernel's `GOES_ON_*`.
     pub fn record_extend(
         &self,
         pass: &mut Pass<'_>,
@@ -138,7 +138,7 @@ impl TracePipelines {
     ) -> Result<()> {
         if let Some(shadow) = &self.shadow {
             let (index, set, media) = (scene.index_set(), scene.scene_set(), scene.media_set());
-            let goes_on = if goes_on { GOES_ON_RAYS } else { 0 };
+            let goes_on = if goes_on { GOES_ON_RAYS } else { GOES_ON_NOT };
             let push = bytemuck::cast(push(scene, key, goes_on));
             pass.dispatch_indirect(shadow, &[wave, &index, &set, &media], &push, rays)?;
             stage_barrier(pass);

@@ -17,7 +17,7 @@ use super::trace::{RAY_QUOTA, TracePipelines, ray_quota};
 use super::turnover::Turnover;
 use super::wave::{Status, WaveBuffers, group_counts, indirect};
 use crate::Result;
-use crate::gpu::shaders::constants::{GOES_ON_FURTHER, GOES_ON_RAYS, STALLED_NOT, WORK_UNIT};
+use crate::gpu::shaders::constants::{GOES_ON_FURTHER, GOES_ON_NOT, GOES_ON_RAYS, STALLED_NOT, WORK_UNIT};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::types::WalkKey;
 use crate::gpu::{Access, DeviceKind, Gpu, Pace, PipelineInfo, Recorder, wide_counter};
@@ -457,7 +457,7 @@ impl Walker {
             } else {
                 if first.has_hits() {
                     let (trace, state) = match (goes_on, finds_hits) {
-                        (false, _) => (&self.trace, 0),
+                        (false, _) => (&self.trace, GOES_ON_NOT),
                         (true, false) => (trace, GOES_ON_RAYS),
                         (true, true) => (trace, GOES_ON_FURTHER),
                     };
@@ -500,7 +500,7 @@ impl Walker {
         self.pace.units(walks, unwatched)
     }
 
-    /// The closest hits of a bounce; `goes_on` as the kernel is told.
+    /// The closest hits of a bounce; `goes_on` is one of the kernel's `GOES_ON_*`.
     fn record_hits(
         &self,
         recorder: &mut Recorder,

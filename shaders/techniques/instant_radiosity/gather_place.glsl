@@ -14,8 +14,7 @@ const uint SELECT_CUTS = 2u;       // one below each node of a cut
 const uint CUT_CANDIDATES_MAX = 8u;
 
 layout(constant_id = 46) const uint SELECTION = SELECT_ALL;
-layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
-layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // of a place, in a dispatch
+layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;  // of a place, in a dispatch
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -42,15 +41,9 @@ layout(push_constant, scalar) uniform Push {
 layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
 
 #include "techniques/instant_radiosity/connection.glsl"
+#include "techniques/instant_radiosity/gather_progress.glsl"
 
 layout(set = 3, binding = 1, scalar) restrict buffer VirtualLightStates { GatherState gather_states[]; };  // by place
-layout(set = 3, binding = 2, scalar) restrict buffer VirtualLightCounters {
-    uint gathers;          // places that gathered
-    uint remaining;        // places of a sweep that have not had all lights
-    uint connections[2];   // 64 bits, low word first: pairs of a place and a light
-    uint shadow_rays[2];   // those that might bring light
-    uint nodes[2];         // of the tree of lights, that places looked at
-} gather_counters;
 layout(set = 3, binding = 3, scalar) restrict readonly buffer LightDepartures { float departures[]; };  // path_departures, by slot
 layout(set = 3, binding = 4) uniform utextureBuffer light_node_texels;                                  // of SELECT_CUTS: the tree of lights
 // Of SELECT_POTENTIAL, from first_selected on, behind the states in the same buffer: the least potential that a place takes, and its rescaling.
@@ -74,25 +67,14 @@ bool begin_receiver(uint slot, uint place, out Receiver r) {
     }
     r.interior = arrival_interior(r.arrival, HAS_TRANSMISSION ? walk_gathered[slot].interior : OUTSIDE);
     r.throughput = absorbed(path.throughput, r.interior, hit.t);
-    if (EDGE_BOUND != EDGE_UNBOUNDED && path.pdf > 0.0) {
+    if (EDGE_BOUND != EDGE_UNBOUNDED) {
         // The path has come over an edge of whose light virtual lights bring what its bound leaves.
         float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
         float cos_here = abs(dot(path.direction, r.arrival.surface.geometric_normal));
-        r.throughput *= 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, hit.t * hit.t);
+        r.throughput *= share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, cos_here, hit.t * hit.t);
     }
     r.frame = scattering_frame(r.arrival, arrival_normal(r.arrival));
     return r.throughput != vec3(0.0);
-}
-
-// Whether the picture has what is scattered so often between a light source and the eye.
-bool counts_bounces(uint bounces) { return !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces); }
-
-// Random words of a connection. The point and the way to it stand for the path, of which a stage between knows no number: under an orthographic camera ways
-// are equal. `purpose` tells words of one connection apart.
-uvec4 connection_words(Receiver r, uint number, uint purpose) {
-    uvec3 place = floatBitsToUint(r.arrival.surface.point.position);
-    uvec3 way = floatBitsToUint(r.arrival.wo);
-    return pcg4d(uvec4(place, push.seed)) + pcg4d(uvec4(way.x ^ number, way.y, way.z + r.bounce, purpose));
 }
 
 #endif

@@ -52,11 +52,6 @@ SceneLightNode load_cut_node(uint index) {
 // Of SELECT_POTENTIAL: what the lights of each bin carry.
 float carried_potentials[POTENTIAL_BINS];
 
-// Stand in walk_resume for a place that goes on in a later dispatch, and for one that has no light to gather or is done.
-const uint GATHER_STOPPED = 0xFFFFFFFEu;
-const uint GATHER_DONE = 0xFFFFFFFCu;
-// Tells the candidates of these rays from those of the paths' own.
-const uint GATHER_SEED = 0x76706c73u;
 // Tells what lights of a cut are chosen by.
 const uint CUT_SEED = 0x76706c63u;
 
@@ -139,7 +134,7 @@ void gather(Receiver r, uint count, vec3 normal, float least, inout GatherState 
         if (counts) {
             rays += at.cursor == INDEX_START ? 1u : 0u;
             if (HAS_ALPHA) {
-                candidate_key = connection_words(r, at.light, GATHER_SEED);
+                candidate_key = connection_words(r, at.light, LIGHT_RAY_SEED);
             }
             Hit hit = no_hit(ray.t_max);
             at.cursor = any_hit(ray, at.cursor, hit);
@@ -158,14 +153,14 @@ void main() {
     }
     bool goes_on = push.goes_on != 0u;
     uint resume = walk_resume[place];
-    if (goes_on ? resume != GATHER_STOPPED : resume == GATHER_STOPPED || resume == GATHER_DONE) {
+    if (goes_on ? resume != LIGHTS_STOPPED : resume == LIGHTS_STOPPED || resume == LIGHTS_DONE) {
         return;
     }
     if (!goes_on && !has_work_left()) {
         leave_for_later(STALLED_ARRIVAL);
         return;
     }
-    walk_resume[place] = GATHER_DONE;
+    walk_resume[place] = LIGHTS_DONE;
     uint slot = load_slot(place);
     Receiver r;
     if (!begin_receiver(slot, place, r)) {
@@ -209,7 +204,7 @@ void main() {
         return;
     }
     gather_states[place] = at;
-    walk_resume[place] = GATHER_STOPPED;
+    walk_resume[place] = LIGHTS_STOPPED;
     if (goes_on) {
         atomicAdd(gather_counters.remaining, 1u);
     } else {

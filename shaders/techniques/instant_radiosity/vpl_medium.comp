@@ -26,7 +26,7 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 layout(set = 1, binding = 0, scalar) restrict buffer CollisionCounters {
-    uint absorbed;  // walks that a collision has ended
+    uint absorbed;  // walks that end in a medium or at its boundary: by roulette, after the last bounce, or without power
     uint kept;      // collisions that became virtual lights
 } collision_counters;
 

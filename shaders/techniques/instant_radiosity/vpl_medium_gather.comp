@@ -23,9 +23,8 @@ layout(local_size_x = 64) in;
 #include "walk/media.glsl"
 #include "wide_counter.glsl"
 
-layout(constant_id = 22) const bool HAS_AIRLIGHT = true;     // eye paths take equi-angular samples
-layout(constant_id = 44) const bool COUNTS_BOUNCES = false;  // the path set bounds the number of scatterings
-layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;     // stretches of shadow rays of a place, in a dispatch
+layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // eye paths take equi-angular samples
+layout(constant_id = 45) const uint LIGHTS_AT_ONCE = 1u;  // stretches of shadow rays of a place, in a dispatch
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -58,14 +57,6 @@ struct MediumGatherState {
 
 layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
 layout(set = 3, binding = 1, scalar) restrict buffer MediumGatherStates { MediumGatherState medium_gather_states[]; };  // by place
-// As in gather_place.glsl.
-layout(set = 3, binding = 2, scalar) restrict buffer VirtualLightCounters {
-    uint gathers;
-    uint remaining;
-    uint connections[2];
-    uint shadow_rays[2];
-    uint nodes[2];
-} gather_counters;
 layout(set = 3, binding = 3, scalar) restrict readonly buffer LightDepartures { float departures[]; };  // path_departures, by slot
 // As in scene/media_bindings.glsl.
 layout(set = 3, binding = 4) uniform utextureBuffer media_records;
@@ -74,6 +65,7 @@ layout(set = 3, binding = 6) uniform textureBuffer media_majorants;
 #define CLERESTORY_MEDIA_BOUND
 
 #include "techniques/instant_radiosity/medium_connection.glsl"
+#include "techniques/instant_radiosity/gather_progress.glsl"
 #include "walk/draws.glsl"
 #include "transport/media_tracking.glsl"
 #include "walk/candidate_alpha.glsl"
@@ -81,25 +73,15 @@ layout(set = 3, binding = 6) uniform textureBuffer media_majorants;
 #define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
 #include "accel/index.glsl"
 
-// Stand in walk_resume for a place that goes on in a later dispatch, and for one that has no light to gather or is done.
-const uint GATHER_STOPPED = 0xFFFFFFFEu;
-const uint GATHER_DONE = 0xFFFFFFFCu;
-// Tells the candidates of these rays from those of the paths' own, and their walks through grids.
-const uint GATHER_SEED = 0x76706c73u;
+// Tells the walks of these rays through grids from those of the paths' own.
 const uint RATIO_SEED = 0x76706c74u;
 // Random numbers of a walk through a grid, as a power of two; those of the next begin behind them.
 const uint RATIO_WALK_SHIFT = 16u;
 
-// Whether the picture has what is scattered so often between a light source and the eye.
-bool counts_bounces(uint bounces) { return !COUNTS_BOUNCES || (bounces >= push.least_bounces && bounces <= push.most_bounces); }
-
 // What virtual lights leave to be gathered at a distance of t from where the path was scattered last, whose light they have up to the bound.
 float gathered_share(uint slot, WalkState path, float cos_here, float t) {
-    if (EDGE_BOUND == EDGE_UNBOUNDED || !(path.pdf > 0.0)) {
-        return 1.0;
-    }
     float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? departures[slot] : 1.0;
-    return 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, t * t);
+    return share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, cos_here, t * t);
 }
 
 // The walk of an eye path's ray through a grid, as path_medium.comp has it: with the same stops, where the path goes on with a way of its own.
@@ -195,13 +177,6 @@ bool begin_receiver(uint slot, uint place, out MediumReceiver r) {
     return r.at.throughput != vec3(0.0);
 }
 
-// Random words of a connection. The point and the way to it stand for the path. `purpose` tells words of one connection apart.
-uvec4 connection_words(MediumReceiver r, uint number, uint purpose) {
-    uvec3 place = floatBitsToUint(r.at.arrival.surface.point.position);
-    uvec3 way = floatBitsToUint(r.at.arrival.wo);
-    return pcg4d(uvec4(place, push.seed)) + pcg4d(uvec4(way.x ^ number, way.y, way.z + r.at.bounce, purpose));
-}
-
 // Takes the stretch up to the next surface, to which the way has been searched, or of a grid as much as a walk's quota allows; true when the ray has ended, its
 // transmittance known. `key` is that of the ray's walks through grids.
 bool pass_stretch(Ray ray, uvec4 key, inout MediumGatherState at) {
@@ -270,13 +245,13 @@ void gather(MediumReceiver r, inout MediumGatherState at, out uint rays) {
                 at.grid_walks = 0u;
             }
             if (HAS_ALPHA) {
-                candidate_key = connection_words(r, at.light, GATHER_SEED);
+                candidate_key = connection_words(r.at, at.light, LIGHT_RAY_SEED);
             }
             Ray rest = Ray(shadow.ray.origin, search_start(at.start), shadow.ray.direction, shadow.ray.t_max);
             at.cursor = closest_hit(rest, at.cursor, at.hit);
             stopped = at.cursor != INDEX_FINISHED;
             if (!stopped) {
-                ended = pass_stretch(shadow.ray, connection_words(r, at.light, RATIO_SEED), at);
+                ended = pass_stretch(shadow.ray, connection_words(r.at, at.light, RATIO_SEED), at);
                 at.sum += ended ? found * at.transmittance : vec3(0.0);
             }
         }
@@ -294,14 +269,14 @@ void main() {
     }
     bool goes_on = push.goes_on != 0u;
     uint resume = walk_resume[place];
-    if (goes_on ? resume != GATHER_STOPPED : resume == GATHER_STOPPED || resume == GATHER_DONE) {
+    if (goes_on ? resume != LIGHTS_STOPPED : resume == LIGHTS_STOPPED || resume == LIGHTS_DONE) {
         return;
     }
     if (!goes_on && !has_work_left()) {
         leave_for_later(STALLED_ARRIVAL);
         return;
     }
-    walk_resume[place] = GATHER_DONE;
+    walk_resume[place] = LIGHTS_DONE;
     uint slot = load_slot(place);
     MediumReceiver r;
     if (!begin_receiver(slot, place, r)) {
@@ -327,7 +302,7 @@ void main() {
         return;
     }
     medium_gather_states[place] = at;
-    walk_resume[place] = GATHER_STOPPED;
+    walk_resume[place] = LIGHTS_STOPPED;
     if (goes_on) {
         atomicAdd(gather_counters.remaining, 1u);
     } else {

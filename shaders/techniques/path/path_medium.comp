@@ -34,11 +34,11 @@ layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular sample
 #include "transport/bodies.glsl"
 #include "transport/phase.glsl"
 
-// What the path under way shares with photons by (path_even_distances).
-float even2 = 0.0;
+// The entry of path_even_distances of the path under way.
+float path_even_distance2 = 0.0;
 
 // Share of the path in light from that squared distance that it scatters at a place of its way.
-float share_here(float light2) { return even2 != 0.0 ? eye_share(light2, abs(even2)) : 1.0; }
+float share_here(float light2) { return path_even_distance2 != 0.0 ? eye_share(light2, abs(path_even_distance2)) : 1.0; }
 
 // As in path_shade.comp.
 layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
@@ -55,12 +55,9 @@ vec3 place_on_way(WalkState path, Way way, float t) { return path.origin + max(w
 
 // Share of what a collision scatters, t from where the path was scattered last, that is the path's own beside those of other means: all where that was a mirror, or nowhere.
 float own_share(uint slot, WalkState path, float t) {
-    if (EDGE_BOUND == EDGE_UNBOUNDED || !(path.pdf > 0.0)) {
-        return 1.0;
-    }
     // There is no cosine at the collision.
     float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? path_departures[slot] : 1.0;
-    return 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, 1.0, t * t);
+    return share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, 1.0, t * t);
 }
 
 // Weight of light sampling of density `light_pdf` (0: of a light without extent) against the phase function's directions, which meet the light, too.
@@ -217,7 +214,7 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
         bool has_beams = !(HAS_GRIDS && m.has_grid != 0u);
         float sine = length(cross(path.direction, wi));
         float first2 = even_distance2(path.pdf, sine, mean_extinction(m.sigma_t), push.photon_radius, float(SHARING_PHOTONS), has_beams);
-        even2 = even2 == 0.0 ? -first2 : abs(even2);
+        path_even_distance2 = path_even_distance2 == 0.0 ? -first2 : abs(path_even_distance2);
     }
     if (HAS_LIGHT_TREE) {
         path_receivers[slot] = LightReceiver(at, vec3(0.0));
@@ -258,7 +255,7 @@ void main() {
     if (status.rounds > 0u) {
         state = walk_medium_states[slot];
         if (SHARES) {
-            even2 = path_even_distances[slot];
+            path_even_distance2 = path_even_distances[slot];
         }
     }
     Hit hit = load_hit(place);
@@ -346,8 +343,8 @@ void main() {
         }
         COUNT_MEDIUM(collisions, outcome == GRID_COLLIDED ? 1u : 0u)
         if (counted && emitted != vec3(0.0)) {
-            if (SHARES && even2 > 0.0) {
-                emitted *= eye_share(placeless_distance2(push.scene_lower, push.scene_upper), even2);
+            if (SHARES && path_even_distance2 > 0.0) {
+                emitted *= eye_share(placeless_distance2(push.scene_lower, push.scene_upper), path_even_distance2);
             }
             walk_gathered[slot].radiance += emitted;
         }
@@ -388,7 +385,7 @@ void main() {
     walk_gathered[slot].interior = interior;
     walk_medium_states[slot] = state;
     if (SHARES) {
-        path_even_distances[slot] = even2;
+        path_even_distances[slot] = path_even_distance2;
     }
     walk_medium_events[place] = MediumEvent(weight, (flags & FLAG_AIRLIGHT) | (handled ? EVENT_HANDLED : 0u));
     walk_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);

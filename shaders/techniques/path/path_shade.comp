@@ -26,11 +26,11 @@ layout(local_size_x = 64) in;
 // Other means have the light of edges between two rough scatterings up to this bound; paths have what it leaves out.
 layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
 
-// What the path under way shares with photons by (path_even_distances).
-float even2 = 0.0;
+// The entry of path_even_distances of the path under way.
+float path_even_distance2 = 0.0;
 
-// Share of the path in light of lights that it meets, behind a scattering that shares: that before was the first one otherwise.
-float share_behind(float light2) { return even2 > 0.0 ? eye_share(light2, even2) : 1.0; }
+// Share of the path in light that its ray meets. Until the second scattering (path_even_distance2 at most 0) that is the path's alone.
+float share_behind(float light2) { return path_even_distance2 > 0.0 ? eye_share(light2, path_even_distance2) : 1.0; }
 
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
@@ -108,10 +108,10 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     }
     // What is scattered here by other lobes than mirrors, of light that came over an edge whose other end scattered by such, is shared.
     float share = 1.0;
-    if (EDGE_BOUND != EDGE_UNBOUNDED && path.pdf > 0.0) {
+    if (EDGE_BOUND != EDGE_UNBOUNDED) {
         float cos_there = EDGE_BOUND == EDGE_GEOMETRY ? path_departures[slot] : 1.0;
         float cos_here = abs(dot(path.direction, s.geometric_normal));
-        share = 1.0 - bounded_share(EDGE_BOUND, push.edge_bound, cos_there, cos_here, hit.t * hit.t);
+        share = share_beyond(EDGE_BOUND, push.edge_bound, path.pdf, cos_there, cos_here, hit.t * hit.t);
         mask &= share > 0.0 ? LOBE_ALL : LOBE_SPECULAR;
         lit_mask &= mask;
     }
@@ -138,10 +138,10 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
             vec4 f = bsdf_eval_part(bsdf, frame.wo, world_to_frame(frame, wi), mask, lit_mask);
             if (f.rgb != vec3(0.0)) {
                 float weight = light.pdf > 0.0 ? power_heuristic(light.pdf, f.a) : 1.0;
-                if (SHARES && even2 != 0.0) {
+                if (SHARES && path_even_distance2 != 0.0) {
                     vec3 to = light.point.position - s.point.position;
                     float light2 = light.infinite ? placeless_distance2(push.scene_lower, push.scene_upper) : dot(to, to);
-                    weight *= eye_share(light2, abs(even2));
+                    weight *= eye_share(light2, abs(path_even_distance2));
                 }
                 ShadowRay ray_to_light;
                 ray_to_light.slot = slot;
@@ -202,7 +202,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         path_departures[slot] = abs(dot(path.direction, s.geometric_normal));
     }
     if (SHARES) {
-        path_even_distances[slot] = abs(even2);
+        path_even_distances[slot] = abs(path_even_distance2);
     }
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);
@@ -234,7 +234,7 @@ void main() {
         path.throughput *= event.weight;
     }
     if (SHARES) {
-        even2 = path_even_distances[slot];
+        path_even_distance2 = path_even_distances[slot];
     }
     shade(slot, place, path, radiance, flags);
     if (radiance != vec3(0.0)) {

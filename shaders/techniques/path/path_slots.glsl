@@ -19,7 +19,8 @@ layout(set = 1, binding = 0, scalar) restrict buffer PathAovs { PathAov path_aov
 layout(set = 1, binding = 1, scalar) restrict buffer PathReceivers { LightReceiver path_receivers[]; };
 // Cosine to the geometric normal under which a path left where it was scattered last, where edges are bounded by their geometry term; elsewhere as above.
 layout(set = 1, binding = 2, scalar) restrict buffer PathDepartures { float path_departures[]; };
-// Of paths that share light with photons what even_distance2 says, from the first scattering in a medium on; 0 before, and negative until the next scattering. Elsewhere as above.
+// Of paths that share light with photons: the squared distance of a light, m2, at which both have half (transport/photon_share.glsl). 0 before the first scattering in a medium;
+// its negative between that and the next scattering, when only light samples are shared; positive after. Where nothing is shared, another buffer is bound.
 layout(set = 1, binding = 3, scalar) restrict buffer PathEvenDistances { float path_even_distances[]; };
 
 #endif

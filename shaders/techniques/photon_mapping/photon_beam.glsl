@@ -7,7 +7,7 @@
 // flights in the band that comes farthest do, it is what other bands have less of.
 // Of planes L = sum_j tau(t_j) sigma_s^2 p(w_j', -v) tau_j' Phi_j / |v . (w_j x w_j')| with the directions w_j and w_j' of both flights, and tau_j' what is left there of other
 // bands than the one that flights end as in: without blur. One of those that a ray meets has a ray that tells whether it is seen (photon_plane_ray.glsl).
-// Where collisions are stored beside beams each has the share of the balance heuristic (point_share). Where eye paths go on, both have but the share that these leave (photons_share).
+// Where collisions are stored beside beams each has the share of the balance heuristic (point_share). Where eye paths go on, both have but the share that these leave (share_left_by_eye_paths).
 // Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Events count in their own medium alone.
 //
 // With a queue (QUEUE) photon_beam_ways.comp has been to all places, and an invocation takes one of those that ask; without one an invocation per place first finds its way
@@ -88,7 +88,7 @@ bool counts_here(uint medium, uint history) {
     return counts;
 }
 
-// As long as short beams are there for a collision, so is the flight that may end in it: their shares do not depend on its length.
+// A short beam reaches a place with the same probability as the photon's own flight, so both densities have the same transmittance and it cancels: the flight counts as 0.
 float share_of_points(float flight, float sine) {
     return point_share(mean_extinction(beam.m.sigma_t), SHORT_WAYS ? 0.0 : flight, push.radius, push.radius, sine);
 }
@@ -97,9 +97,9 @@ float share_of_points(float flight, float sine) {
 vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s, beam.m.sigma_t) : beam.m.sigma_t; }
 
 // Share of a record's light that eye paths which go on leave to photons, by the density of its phase function.
-float photons_share(uvec4 q2, float phase, float sine, bool has_beams) {
-    float even2 = even_distance2(phase, sine, mean_extinction(beam.m.sigma_t), push.radius, push.photons, has_beams);
-    return photon_share(unpack_light(q2), even2);
+float share_left_by_eye_paths(uvec4 q2, float phase, float sine, bool has_beams) {
+    float extinction = mean_extinction(beam.m.sigma_t);
+    return photon_share(unpack_light_distance2(q2), even_distance2(phase, sine, extinction, push.radius, push.photons, has_beams));
 }
 
 // Adds a beam's light where the ray passes it.
@@ -116,8 +116,8 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
             float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
             float phase = phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
             weight *= phase;
-            if (TELLS_LIGHTS) {
-                weight *= photons_share(q2, phase, at.sine, true);
+            if (CARRIES_LIGHT_DISTANCE) {
+                weight *= share_left_by_eye_paths(q2, phase, at.sine, true);
             }
             if (POINTS) {
                 weight *= 1.0 - share_of_points(unpack_flight(q2) + at.along, at.sine);
@@ -194,8 +194,8 @@ bool compact_visit_beam(uint record) {
             if (POINTS && !(HAS_GRIDS && beam.m.has_grid != 0u)) {
                 weight *= share_of_points(unpack_flight(q2), sine);
             }
-            if (TELLS_LIGHTS) {
-                weight *= photons_share(q2, phase, sine, !(HAS_GRIDS && beam.m.has_grid != 0u));
+            if (CARRIES_LIGHT_DISTANCE) {
+                weight *= share_left_by_eye_paths(q2, phase, sine, !(HAS_GRIDS && beam.m.has_grid != 0u));
             }
             ++gathered_events;
             gathered += weight * phase * e.flux;

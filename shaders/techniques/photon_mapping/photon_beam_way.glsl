@@ -65,7 +65,7 @@ layout(push_constant, scalar) uniform Push {
     float scale;         // of stored fluxes
     float radius;        // of beams, and of collisions beside them
     float plane_weight;  // of planes' fluxes, beside the scale
-    float photons;       // of a pass, of TELLS_LIGHTS
+    float photons;       // of a pass, of CARRIES_LIGHT_DISTANCE
     uint first_place;    // of LINEAR
     uint first;          // of the records that a linear query goes through
     uint last;

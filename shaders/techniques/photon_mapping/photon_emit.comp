@@ -22,7 +22,7 @@ layout(push_constant, scalar) uniform Push {
     uint photons;  // of the pass
     float share;   // of them that lights send
     float weight;  // of these, the reciprocal
-    float placeless2;  // carried by photons from infinity, m2 (transport/photon_share.glsl); 0 where none tell their light
+    float placeless2;  // carried by photons from infinity, m2 (transport/photon_share.glsl); 0 where they carry none
 } push;
 
 #include "walk/draws.glsl"

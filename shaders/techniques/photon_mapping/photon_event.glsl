@@ -106,7 +106,7 @@ bool is_plane(uvec4 q2) { return uintBitsToFloat(q2.xyz) != vec3(0.0); }
 // which the photon's light was from its first scattering, m2, or 0 where no eye path finds it.
 uvec4 pack_flight(float flight, float light2, uint kind) { return uvec4(floatBitsToUint(flight), floatBitsToUint(light2), 0u, kind); }
 float unpack_flight(uvec4 q2) { return uintBitsToFloat(q2.x); }
-float unpack_light(uvec4 q2) { return uintBitsToFloat(q2.y); }
+float unpack_light_distance2(uvec4 q2) { return uintBitsToFloat(q2.y); }
 bool is_point(uvec4 q2) { return q2.w == POINT_RECORD; }
 
 // Share that the estimate by collisions has of light that one by beams has, too, in media of this mean extinction: the balance heuristic. A photon collides within the disk of a

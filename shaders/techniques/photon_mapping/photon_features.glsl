@@ -10,7 +10,7 @@ layout(constant_id = 48) const bool STORES_LIGHTS = false;     // deposits becom
 layout(constant_id = 58) const bool ONLY_ROUGH = false;        // photons are scattered by diffuse and glossy lobes alone
 
 // Photons carry how far their light is from their first scattering, by which records in media share their light with eye paths that go on (transport/photon_share.glsl).
-layout(constant_id = 50) const bool TELLS_LIGHTS = false;
+layout(constant_id = 50) const bool CARRIES_LIGHT_DISTANCE = false;
 
 layout(constant_id = 54) const bool HAS_CLASSES = false;       // the path set is an expression, which tells photons apart by their class
 

@@ -32,7 +32,7 @@ layout(push_constant, scalar) uniform Push {
     uint bodies;
     uint surrounding;  // index of the medium outside all bodies, or NO_MEDIUM
     uint outside;      // stands for the material of a body where there is none around
-    float placeless2;  // carried by photons, m2 (transport/photon_share.glsl); 0 where none tell their light
+    float placeless2;  // carried by photons, m2 (transport/photon_share.glsl); 0 where they carry none
 } push;
 
 #include "walk/draws.glsl"

@@ -72,8 +72,8 @@ float radius_in(SceneMedium m, float radius) {
     return push.path_share > 0.0 ? min(radius, push.path_share / densest) : radius;
 }
 
-// What a record says of the photon's light.
-float told_light(WalkState photon) { return TELLS_LIGHTS && path_set_bounce(photon.bounce) > 0u ? photon.pdf : 0.0; }
+// What a record has of the photon's light: its squared distance from the first scattering, m2, or 0.
+float recorded_light_distance2(WalkState photon) { return CARRIES_LIGHT_DISTANCE && path_set_bounce(photon.bounce) > 0u ? photon.pdf : 0.0; }
 
 // Stores the photon's way through a homogeneous medium, `reach` long.
 uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
@@ -90,7 +90,7 @@ uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedi
     way.bounce = HAS_CLASSES ? path_set_state(photon.bounce) : bounce;
     way.sigma_t = SHORT_WAYS ? short_way_extinction(m.sigma_s, m.sigma_t) : m.sigma_t;
     way.pieces = pieces;
-    way.light2 = told_light(photon);
+    way.light2 = recorded_light_distance2(photon);
     photon_ways[place] = way;
     return FLAG_WAITING | FLAG_VOLUME;
 }
@@ -157,7 +157,7 @@ uint deposit(uint slot, uint place, WalkState photon, uint medium, vec3 at, floa
     vec3 flux = dithered_flux(photon.throughput * push.flux_scale, slot, bounce);
     pack_event(PhotonEvent(at, photon.direction, flux, radius, medium, history), q0, q1);
     if (STORES_POINTS) {
-        return store_beside(place, q0, q1, pack_flight(flight, told_light(photon), POINT_RECORD));
+        return store_beside(place, q0, q1, pack_flight(flight, recorded_light_distance2(photon), POINT_RECORD));
     }
     store_waiting(place, q0, q1, uvec4(0u));
     return FLAG_WAITING | FLAG_VOLUME;
@@ -185,7 +185,7 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
         float phase = phase_function(m.phase, m.phase_parameter, photon.direction, wi);
         photon_medium_differentials[slot] = scattered_in_medium(f.across, f.pdf, f.here, survival, wi, phase);
     }
-    if (TELLS_LIGHTS) {
+    if (CARRIES_LIGHT_DISTANCE) {
         photon.pdf = carried_distance2(photon.pdf, bounce, distance(photon.origin, at), true);
     }
     photon.direction = wi;

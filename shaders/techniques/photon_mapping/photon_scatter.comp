@@ -210,7 +210,7 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     photon.throughput = flux / survival;
     photon.origin = departure(a, wi, photon.throughput);
     photon.direction = normalize(wi);
-    if (TELLS_LIGHTS) {
+    if (CARRIES_LIGHT_DISTANCE) {
         photon.pdf = carried_distance2(photon.pdf, bounce, hit.t, (scattered.flags & (LOBE_DIFFUSE | LOBE_GLOSSY)) != 0u);
     } else if (HAS_MEDIA) {
         photon.pdf = PHOTON_FROM_ELSEWHERE;

@@ -139,6 +139,69 @@ pub fn place_sparse_grid(scene: &mut Scene, density: f32) {
     scene.add_light("point", LightKind::Point { position, intensity });
 }
 
+/// Densities of the cells of a grid that is one cell wide, from below to above.
+#[derive(Debug, Clone)]
+pub struct DensityProfile {
+    /// What it is, in words.
+    pub name: &'static str,
+    /// Density of each cell, by which a medium's cross sections are multiplied.
+    pub values: Vec<f32>,
+}
+
+/// Extinctions of the bands at a density of 1, 1/m, of [`floor_under`].
+pub const PROFILE_SIGMA: [f32; 3] = [0.5, 1.0, 2.0];
+/// Faces of a profile's grid above the floor, m, a metre apart.
+pub const PROFILE_FACES: [f64; 2] = [0.5, 1.5];
+
+/// Waves that fill blocks of the bound unevenly; one dense cell of twelve; a layer thinner than the places of a table of transmittances are apart, and midway between
+/// two of these.
+pub fn density_profiles() -> [DensityProfile; 3] {
+    let waves = (0..12).map(|i| 1.0 + 0.9 * (7.0 * (f64::from(i) + 0.5) / 12.0).sin() as f32);
+    let dense = |cells: usize, at: usize, background: f32, density: f32| {
+        let mut values = vec![background; cells];
+        values[at] = density;
+        values
+    };
+    let profile = |name, values| DensityProfile { name, values };
+    [
+        profile("waves", waves.collect()),
+        profile("one dense cell of twelve", dense(12, 5, 0.1, 9.0)),
+        profile("a layer of a 512th", dense(1024, 512, 1.0, 1024.0)),
+    ]
+}
+
+/// The grid of a profile over what is seen of a floor, or so far aside.
+pub fn profile_grid(profile: &DensityProfile, aside: f64) -> DensityGrid {
+    let grid = DensityGrid {
+        size: [1, profile.values.len() as u32, 1],
+        values: profile.values.clone(),
+        to_world: DAffine3::IDENTITY,
+    };
+    let [low, high] = PROFILE_FACES;
+    grid.in_box(DVec3::new(aside - 1.0, low, -1.0), DVec3::new(aside + 1.0, high, 1.0))
+}
+
+/// A floor that a light beneath the grid of a profile lights, seen from straight above through the grid, or beside it where that is far enough aside. The grid only
+/// absorbs.
+pub fn floor_under(profile: &DensityProfile, aside: f64) -> Scene {
+    let mut scene = Scene {
+        name: "floor under a grid".into(),
+        ..Scene::default()
+    };
+    let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
+    scene.place(floor("floor", white, 1.5, 0.0));
+    scene.media.push(Medium {
+        sigma_a: Vec3::from_array(PROFILE_SIGMA),
+        density: Some(profile_grid(profile, aside)),
+        ..Medium::default()
+    });
+    scene.surrounding = Some(0);
+    scene.cameras.push(camera_down(0.3, 5.0));
+    let (position, intensity) = (Vec3::new(0.5, 0.3, 0.4), Vec3::ONE);
+    scene.add_light("light", LightKind::Point { position, intensity });
+    scene
+}
+
 /// Equal triangles, which no index can part, before a floor under a uniform sky: a ray that crosses their box beside them meets none, and tests all.
 pub fn equal_triangles(count: usize) -> Scene {
     let mut scene = Scene {

@@ -212,6 +212,7 @@ fn walks_through_media_are_counted() {
             let c = renderer.counts().walks;
             assert_eq!((c.emitted, c.escaped, c.absorbed), (1 << 10, 0, 1 << 10), "{c:?}");
             assert_eq!(c.events, c.collisions, "{c:?}");
+            assert_eq!(renderer.counters()["walk_collisions"], c.collisions, "{c:?}");
             assert_eq!(lights.len() as u64, c.deposits + c.events, "{c:?}");
             assert_eq!(c.events > 50, scatters, "{}: {c:?}", scene.name);
             // Those at collisions have no normal, and lie within the room.

@@ -54,7 +54,7 @@ struct Class {
 }
 
 /// Fresnel's reflectance; `eta`: index behind over index before.
-fn fresnel(cos: f64, eta: f64) -> f64 {
+pub(super) fn fresnel(cos: f64, eta: f64) -> f64 {
     let refracted = (1.0 - (1.0 - cos * cos) / (eta * eta)).sqrt();
     let across = (cos - eta * refracted) / (cos + eta * refracted);
     let along = (eta * cos - refracted) / (eta * cos + refracted);

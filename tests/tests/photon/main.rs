@@ -29,6 +29,7 @@ mod unified;
 mod volume;
 mod volume_counts;
 mod volume_extremes;
+mod volume_footprints;
 mod volume_kernels;
 mod volume_queues;
 mod volume_refusals;

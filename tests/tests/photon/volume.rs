@@ -136,7 +136,11 @@ fn collisions_are_as_many_as_the_albedo_says() {
             let (n, a) = (f64::from(photons), f64::from(albedo));
             // Photons end at collisions alone, with the probability 1 − α each: numbers are geometric.
             let mean = counts.photons.collisions as f64 / n;
-            expect_mean("collisions", mean, a / (1.0 - a).powi(2) / n, 1.0 / (1.0 - a), 0.0);
+            let variance = a / (1.0 - a).powi(2) / n;
+            expect_mean("collisions", mean, variance, 1.0 / (1.0 - a), 0.0);
+            // What comes to collisions in all, of which each scatters the albedo: the light's power over 1 − α.
+            let stored: f64 = events.iter().map(|e| f64::from(e.event.flux.x)).sum();
+            expect_mean("stored flux", stored / a, variance, 1.0 / (1.0 - a), 0.0);
             // What collisions scatter: α of the first, α of what is left at each further one.
             for order in 0..4 {
                 let of_order = events.iter().filter(|e| e.event.bounce == order);
@@ -212,7 +216,7 @@ pub(super) fn single(volume: VolumeEstimate, radius: f32) -> PhotonSettings {
 }
 
 /// Parameters of [`airlight`], and the exact radiance.
-const AIRLIGHT: [(f32, f32, f64); 6] = [
+pub(super) const AIRLIGHT: [(f32, f32, f64); 6] = [
     (0.0, 2.0, 0.0108397),
     (0.5, 2.0, 0.0113180),
     (-0.5, 2.0, 0.0097508),
@@ -450,6 +454,35 @@ fn kernels_from_footprints_hold_as_many_collisions_as_they_should() {
         let mean = counts.iter().sum::<f64>() / counts.len() as f64;
         println!("collisions in the ball: {mean:.1}, of even ones 113.1");
         assert!((mean / 113.1 - 1.0).abs() < 0.1, "{mean}");
+        // So radii are the distances of the 113th others, at whatever distance from the light: in proportion, and as large. Density that changes within a ball takes some per cent of both.
+        let pairs: Vec<[f64; 2]> = first
+            .iter()
+            .filter(|e| (0.2..4.0).contains(&e.position.length()))
+            .step_by(13)
+            .map(|e| {
+                let mut squares: Vec<f32> = first.iter().map(|o| o.position.distance_squared(e.position)).collect();
+                // Itself is the one before the first.
+                let (_, square, _) = squares.select_nth_unstable_by(113, f32::total_cmp);
+                [f64::from(e.radius).ln(), 0.5 * f64::from(*square).ln()]
+            })
+            .collect();
+        let count = pairs.len() as f64;
+        let [x, y] = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).sum::<f64>() / count);
+        let (together, alone) = pairs.iter().fold((0.0, 0.0), |(together, alone), pair| {
+            let off = pair[0] - x;
+            (together + off * (pair[1] - y), alone + off * off)
+        });
+        let (slope, ratio) = (together / alone, (y - x).exp());
+        println!("radii beside distances of the 113th: slope {slope:.3}, ratio {ratio:.3}");
+        assert!(
+            count > 500.0 && alone / count > 0.25,
+            "{count} radii, variance {}",
+            alone / count
+        );
+        assert!(
+            (slope - 1.0).abs() < 0.06 && (ratio - 1.0).abs() < 0.06,
+            "{slope} {ratio}"
+        );
         // Further collisions have wider kernels, by the distance from which they were scattered anew.
         assert!(
             events

@@ -1,11 +1,12 @@
 //! How wide kernels in media are: what a pilot chooses, each medium's own, and those by neighbours.
 
-use super::volume::{airlight, all_events, endless, lit_box, single, uneven};
+use super::volume::{AIRLIGHT, airlight, all_events, endless, lit_box, single, uneven};
 use super::*;
 use clerestory::Error;
 use clerestory::accel::sphere::closest_approach;
 use clerestory::scene::{Phase, Projection};
 use clerestory::techniques::photon_mapping::kernel::kernel_profile;
+use clerestory::techniques::photon_mapping::volume::event::PhotonEvent;
 use clerestory::techniques::photon_mapping::volume::{VolumeEstimate, VolumeKernel};
 use clerestory::transport::phase::phase_function;
 use clerestory_tests::render::{builtin, cuboid, medium};
@@ -242,38 +243,61 @@ fn kernels_by_neighbours_hold_so_many() {
     });
 }
 
+/// What the ray of [`airlight`] sees of collisions by phase functions of these eccentricities, and what a device sees.
+fn seen_and_found(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, ks: [f32; 2]) -> ([f64; 2], f64) {
+    let (events, _) = all_events(gpu, scene, settings, 0);
+    // Coefficients of 0.1 and 0.05, a wall 4 m away.
+    let of_event = |e: PhotonEvent, k: f32| {
+        let near = closest_approach(DVec3::ZERO, DVec3::Z, e.position.as_dvec3());
+        let h = f64::from(e.radius);
+        let direction = e.direction.as_dvec3().normalize();
+        let phase = phase_function(Phase::Schlick { k }, direction, DVec3::NEG_Z);
+        let weight = kernel_profile(KernelProfile::Epanechnikov, near.distance_squared / (h * h)) / (h * h);
+        if near.t > 0.0 && near.t < 4.0 {
+            weight * (-0.15 * near.t).exp() * phase * f64::from(e.flux.x)
+        } else {
+            0.0
+        }
+    };
+    let seen: [f64; 2] = ks.map(|k| events.iter().map(|e| of_event(e.event, k)).sum());
+    (seen, sums(&photons(gpu, scene, settings, 1))[0][0] / pixels(0))
+}
+
 #[test]
 fn rays_see_the_kernels_that_events_have() {
     with_gpu(|gpu| {
-        let scene = airlight(0.5, 2.0, 1.0);
         for volume_kernel in [VolumeKernel::Fixed, VolumeKernel::Footprint, VolumeKernel::Neighbor] {
             let settings = PhotonSettings {
                 volume_kernel,
+                photons: 1 << 11,
                 ..single(VolumeEstimate::Ray, 0.6)
             };
-            let settings = PhotonSettings {
-                photons: 1 << 11,
-                ..settings
-            };
-            let (events, _) = all_events(gpu, &scene, &settings, 0);
-            // Coefficients of 0.1 and 0.05, a wall 4 m away.
-            let seen = events.iter().map(|e| e.event).filter_map(|e| {
-                let near = closest_approach(DVec3::ZERO, DVec3::Z, e.position.as_dvec3());
-                let h = f64::from(e.radius);
-                let phase = phase_function(
-                    Phase::Schlick { k: 0.5 },
-                    e.direction.as_dvec3().normalize(),
-                    DVec3::NEG_Z,
-                );
-                let weight = kernel_profile(KernelProfile::Epanechnikov, near.distance_squared / (h * h)) / (h * h);
-                (near.t > 0.0 && near.t < 4.0).then_some(weight * (-0.15 * near.t).exp() * phase * f64::from(e.flux.x))
-            });
-            let expected: f64 = seen.sum();
-            let found = sums(&photons(gpu, &scene, &settings, 1))[0][0] / pixels(0);
-            println!("{volume_kernel:?}: {found:.6}, by its events {expected:.6}");
+            let ([seen, _], found) = seen_and_found(gpu, &airlight(0.5, 2.0, 1.0), &settings, [0.5; 2]);
+            println!("{volume_kernel:?}: {found:.6}, by its events {seen:.6}");
             assert!(
-                expected > 5e-3 && (found / expected - 1.0).abs() < 1e-4,
-                "{volume_kernel:?}: {found} {expected}"
+                seen > 5e-3 && (found / seen - 1.0).abs() < 1e-4,
+                "{volume_kernel:?}: {found} {seen}"
+            );
+        }
+    });
+}
+
+#[test]
+fn no_phase_function_is_mirrored() {
+    with_gpu(|gpu| {
+        for (k, z, _) in AIRLIGHT {
+            let scene = airlight(k, z, 1.0);
+            let ([seen, mirrored], found) = seen_and_found(gpu, &scene, &single(VolumeEstimate::Ray, 0.6), [k, -k]);
+            println!(
+                "{}: {found:.6}, by its events {seen:.6}, mirrored {mirrored:.6}",
+                scene.name
+            );
+            assert!((found / seen - 1.0).abs() < 1e-4, "{}: {found} {seen}", scene.name);
+            // Of the same collisions, so that their noise is in both.
+            assert!(
+                k == 0.0 || (mirrored / seen - 1.0).abs() > 0.05,
+                "{}: {mirrored} {seen}",
+                scene.name
             );
         }
     });

@@ -177,3 +177,35 @@ fn furnaces_stay_even_with_lossless_media_inside() {
         }
     });
 }
+
+#[test]
+fn media_scatter_what_they_take_in_furnaces() {
+    with_gpu(|gpu| {
+        let mut room = builtin("builtin:furnace-box?rho=0.5&emission=1");
+        // The far wall is 1.9 mean free paths away.
+        room.cameras = vec![parallel(DVec3::Z * 0.9, DVec3::NEG_Z, 0.5)];
+        room.surrounding = Some(0);
+        room.media = vec![medium(1.0, 1.0, Phase::HenyeyGreenstein { g: 0.5 })];
+        let passed = f64::exp(-1.9);
+        for volume in [VolumeEstimate::Ray, VolumeEstimate::March, VolumeEstimate::Beams] {
+            // As in the whole, of which each is a part: balls lack events behind walls.
+            let bias = if volume == VolumeEstimate::March { 2.5e-2 } else { 5e-3 };
+            for (set, expected, bias) in [
+                ("L.*VE", 2.0 * (1.0 - passed), bias),
+                ("LE|L.*[^V]E", 2.0 * passed, 1e-2),
+            ] {
+                let settings = PhotonSettings {
+                    volume,
+                    volume_radius: 0.1,
+                    radius: 0.2,
+                    photons: 1 << 9,
+                    ..settings(set)
+                };
+                let found = means(gpu, &room, &settings, 12);
+                for channel in 0..3 {
+                    found.expect(&format!("{set}, {volume:?}"), 0, channel, exactly(expected), bias);
+                }
+            }
+        }
+    });
+}

@@ -1,5 +1,6 @@
 //! Free flight, null collisions and equi-angular sampling.
 
+use clerestory::transport::densest_band::{densest_band, densest_band_flight, passed_second_moment};
 use clerestory::transport::medium::{
     FAR_AWAY, attenuated_length, collision_density, equi_angular, equi_angular_helps, equi_angular_pdf,
     equi_angular_sample, sample_free_flight, sample_null_collision,
@@ -111,5 +112,36 @@ fn equi_angular_samples_and_null_collisions_agree_with_their_twins() {
                 ]
             },
         );
+    });
+}
+
+#[test]
+fn flights_by_the_densest_band_agree_with_their_twins() {
+    with_gpu(|gpu| {
+        let table = cases(23, |r| {
+            let sigma_t: [f32; 3] = std::array::from_fn(|_| r.choose(&[0.0, 1e-4, 0.3, 1.0, 7.0]));
+            let albedo = r.unit();
+            let t_max = r.choose(&[1e-3, 0.5, 4.0]);
+            join(&[
+                &sigma_t.map(|s| s * albedo),
+                &sigma_t,
+                &[t_max, unit(r), r.range(0.0, 2.0)],
+                &bands(r),
+            ])
+        });
+        // As of free flight, with exponents of at most 28.
+        let tolerance = Tolerance {
+            input_size: 1.0,
+            ..ulps(256.0, 8.0, 0.0)
+        };
+        check(gpu, "flights by the densest band", 19, &table, tolerance, 12, |x| {
+            let f = densest_band_flight(v3(x, 0), v3(x, 3), x[6], x[7]);
+            list![
+                [f.t, flag(f.collides)],
+                f.weight.to_array(),
+                densest_band(v3(x, 3)).to_array(),
+                passed_second_moment(v3(x, 3), v3(x, 9), x[8]).to_array(),
+            ]
+        });
     });
 }

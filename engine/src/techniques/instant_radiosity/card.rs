@@ -115,7 +115,7 @@ impl Technique for VirtualLights {
             ("walks", c.walks.emitted),
             ("walks_escaped", c.walks.escaped),
             ("walks_absorbed", c.walks.absorbed),
-            ("walks_collided", c.walks.collisions),
+            ("walk_collisions", c.walks.collisions),
             ("virtual_lights", c.lights),
             ("gathers", c.gather.gathers),
             ("connections", c.gather.connections),

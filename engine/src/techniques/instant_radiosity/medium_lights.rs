@@ -5,7 +5,7 @@ use crate::gpu::shaders::constants::{NO_MEDIUM, VIRTUAL_LIGHT_QUARTERS};
 use crate::gpu::shaders::sets::PhotonWave;
 use crate::gpu::shaders::techniques::instant_radiosity::{vpl_medium, vpl_medium_append};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, Pass, PipelineInfo};
-use crate::techniques::photon_mapping::{Append, CollisionPass, CollisionStage};
+use crate::techniques::photon_mapping::{Append, CollisionCounts, CollisionPass, CollisionStage};
 use crate::transport::random::SamplerKind;
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{Bounce, stage_barrier};
@@ -130,8 +130,11 @@ impl CollisionStage for MediumLights {
         pass.copy(self.counters.view(), self.counters_readback.view())
     }
 
-    fn counts(&self) -> Result<[u32; 2]> {
+    fn counts(&self) -> Result<CollisionCounts> {
         let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
-        Ok([counters.absorbed, counters.kept])
+        Ok(CollisionCounts {
+            absorbed: counters.absorbed,
+            kept: counters.kept,
+        })
     }
 }

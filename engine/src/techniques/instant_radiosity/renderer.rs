@@ -144,7 +144,7 @@ impl VirtualLights {
                 even_survival: settings.fractional,
                 stores_lights: true,
                 only_rough: false,
-                tells_lights: false,
+                carries_light_distance: false,
                 stored: Stored {
                     first_bounce: 0,
                     last_bounce: settings.most().map_or(u32::MAX, |most| most - CONNECTED),

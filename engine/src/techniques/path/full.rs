@@ -52,7 +52,7 @@ impl PathTracer {
             adaptive: None,
             kept: &self.kept,
             light_tree: self.light_tree.as_ref(),
-            others: self.others,
+            shared_light: self.shared_light,
             arrival,
             under_way: UnderWay::Full {
                 refill: &full.refill,

@@ -18,11 +18,11 @@ mod directions;
 mod full;
 mod in_order;
 mod kept;
-mod others;
 mod pipelines;
 mod record;
 mod refill;
 mod settings;
+mod shared_light;
 pub(super) mod unseen;
 mod wave;
 
@@ -31,11 +31,11 @@ use std::sync::Arc;
 use self::adaptive::AdaptiveSamples;
 pub(super) use self::card::CARD;
 use self::kept::{KeptBySlot, KeptNeeds};
-use self::others::OtherMeans;
 use self::pipelines::{CameraStage, Pipelines};
 use self::record::{EyeStages, ResolveTarget, UnderWay, record_resolve};
 use self::refill::{FullWave, ResultMemory, slot_numbers};
 pub use self::settings::{Adaptive, LightTreeUse, PathTracerSettings};
+use self::shared_light::SharedLight;
 pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -114,7 +114,7 @@ pub struct PathTracer {
     gpu: Gpu,
     scene: Arc<GpuScene>,
     settings: PathTracerSettings,
-    others: OtherMeans,
+    shared_light: SharedLight,
     frame: CameraFrame,
     /// Where the camera is, for the medium around it.
     eye: DVec3,
@@ -171,11 +171,11 @@ impl PathTracer {
         edge_bound: EdgeBound,
         stage_bytes: u64,
     ) -> Result<Self> {
-        let others = OtherMeans {
+        let shared_light = SharedLight {
             edge_bound,
-            ..OtherMeans::default()
+            ..SharedLight::default()
         };
-        Self::beside(gpu, scene, camera, size, settings, others, stage_bytes)
+        Self::beside(gpu, scene, camera, size, settings, shared_light, stage_bytes)
     }
 
     /// As [`PathTracer::new`], for pictures in which so many photons of a pass share what paths scatter behind their first scattering in a medium
@@ -192,11 +192,11 @@ impl PathTracer {
             photons == 0 || !settings.keeps_waves_full(),
             "paths of whole waves begin together"
         );
-        let others = OtherMeans {
+        let shared_light = SharedLight {
             photons,
-            ..OtherMeans::default()
+            ..SharedLight::default()
         };
-        Self::beside(gpu, scene, camera, size, settings, others, 0)
+        Self::beside(gpu, scene, camera, size, settings, shared_light, 0)
     }
 
     fn beside(
@@ -205,7 +205,7 @@ impl PathTracer {
         camera: &Camera,
         size: [u32; 2],
         settings: PathTracerSettings,
-        others: OtherMeans,
+        shared_light: SharedLight,
         stage_bytes: u64,
     ) -> Result<Self> {
         settings.check()?;
@@ -227,7 +227,15 @@ impl PathTracer {
         } else {
             None
         };
-        let pipelines = Pipelines::new(gpu, &scene, &settings, light_tree.is_some(), others, &frame, camera)?;
+        let pipelines = Pipelines::new(
+            gpu,
+            &scene,
+            &settings,
+            light_tree.is_some(),
+            shared_light,
+            &frame,
+            camera,
+        )?;
         let has_media = scene.profile().media.any();
         let needs = WaveNeeds {
             waiting: scene.has_lights(),
@@ -240,12 +248,12 @@ impl PathTracer {
         let reading = BufferDesc::readback("film readback", band.unwrap_or(0) * pixel_bytes);
         let adaptive = settings.adaptive != Adaptive::Off;
         let more = |slots| {
-            let has_departures = matches!(others.edge_bound, EdgeBound::Geometry(_));
+            let has_departures = matches!(shared_light.edge_bound, EdgeBound::Geometry(_));
             let has = KeptNeeds {
                 aovs: film.has_aovs(),
                 receivers: light_tree.is_some(),
                 departures: has_departures,
-                even_distances: others.photons > 0,
+                even_distances: shared_light.photons > 0,
                 stage_bytes,
             };
             let kept = KeptBySlot::new(gpu, slots, has)?;
@@ -290,7 +298,7 @@ impl PathTracer {
             gpu: gpu.clone(),
             scene,
             settings,
-            others,
+            shared_light,
             frame,
             eye: camera.transform.translation,
             pipelines,
@@ -457,7 +465,7 @@ impl PathTracer {
 
     /// Within which photons are seen that share light with the paths, m: for waves that have not begun.
     pub(crate) fn see_photons_within(&mut self, radius: f64) {
-        self.others.photon_radius = radius as f32;
+        self.shared_light.photon_radius = radius as f32;
     }
 
     /// What an arrival stage keeps by place, of as many bytes as were asked for.
@@ -534,7 +542,7 @@ impl PathTracer {
             adaptive: self.adaptive.as_ref(),
             kept: &self.kept,
             light_tree: self.light_tree.as_ref(),
-            others: self.others,
+            shared_light: self.shared_light,
             arrival,
             under_way: UnderWay::Whole {
                 wave: *wave,

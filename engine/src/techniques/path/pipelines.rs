@@ -1,8 +1,8 @@
 //! The path tracer's own kernels, specialized to what a scene needs.
 
 use super::directions::DirectionsStage;
-use super::others::OtherMeans;
 use super::settings::PathTracerSettings;
+use super::shared_light::SharedLight;
 use crate::Result;
 use crate::gpu::shaders::techniques::path::{path_camera, path_medium, path_refill, path_resolve, path_shade};
 use crate::gpu::{ComputePipeline, Gpu, PipelineInfo};
@@ -70,7 +70,7 @@ impl Pipelines {
         scene: &GpuScene,
         settings: &PathTracerSettings,
         has_light_tree: bool,
-        others: OtherMeans,
+        shared_light: SharedLight,
         frame: &CameraFrame,
         camera: &Camera,
     ) -> Result<Self> {
@@ -91,8 +91,8 @@ impl Pipelines {
             has_path_automaton: settings.path_set.has_automaton(),
             has_lobe_labels: overlapping && settings.path_set.tells_reflections_apart(),
             count_fetches: settings.count_fetches,
-            edge_bound: others.edge_bound.kind(),
-            sharing_photons: others.photons,
+            edge_bound: shared_light.edge_bound.kind(),
+            sharing_photons: shared_light.photons,
         });
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.

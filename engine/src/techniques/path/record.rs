@@ -3,10 +3,10 @@
 use super::adaptive::AdaptiveSamples;
 use super::in_order::{Piece, SamplesInOrder};
 use super::kept::KeptBySlot;
-use super::others::OtherMeans;
 use super::pipelines::{CameraStage, Pipelines};
 use super::refill::RefillStage;
 use super::settings::PathTracerSettings;
+use super::shared_light::SharedLight;
 use super::wave::Wave;
 use crate::Result;
 use crate::film::GpuFilm;
@@ -31,7 +31,7 @@ pub(super) struct EyeStages<'a> {
     pub adaptive: Option<&'a AdaptiveSamples>,
     pub kept: &'a KeptBySlot,
     pub light_tree: Option<&'a TexelView>,
-    pub others: OtherMeans,
+    pub shared_light: SharedLight,
     pub arrival: Option<&'a dyn ArrivalStage>,
     pub under_way: UnderWay<'a>,
 }
@@ -91,8 +91,8 @@ impl EyeStages<'_> {
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             accepting: settings.path_set.accepting(),
             successors: settings.path_set.successors(),
-            edge_bound: self.others.edge_bound.value(),
-            photon_radius: self.others.photon_radius,
+            edge_bound: self.shared_light.edge_bound.value(),
+            photon_radius: self.shared_light.photon_radius,
         }
     }
 }

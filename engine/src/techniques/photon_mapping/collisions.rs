@@ -16,6 +16,15 @@ pub(in crate::techniques) struct CollisionPass {
     pub last_bounce: u32,
 }
 
+/// Of a wave.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::techniques) struct CollisionCounts {
+    /// Walks that end in a medium or at its boundary: by roulette, after the last bounce, or without power.
+    pub absorbed: u32,
+    /// Collisions that were kept.
+    pub kept: u32,
+}
+
 /// The stage between closest hits and scattering by surfaces: it writes `walk_medium_events` of all places, and handles walks that collide or pass a boundary. What it
 /// keeps of a collision waits by place.
 pub(in crate::techniques) trait CollisionStage: Send {
@@ -39,9 +48,9 @@ pub(in crate::techniques) trait CollisionStage: Send {
     /// Those of recording.
     fn read_back(&self, pass: &mut Pass<'_>) -> Result<()>;
 
-    /// Of the last wave: walks that collisions have ended, and collisions that were kept.
+    /// Of the last wave.
     ///
     /// # Errors
     /// [`Error::DeviceLost`](crate::Error::DeviceLost).
-    fn counts(&self) -> Result<[u32; 2]>;
+    fn counts(&self) -> Result<CollisionCounts>;
 }

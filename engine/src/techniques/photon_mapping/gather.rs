@@ -375,7 +375,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-ST-1",
-        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave; and the first three in one kernel",
+        name: "stages of eye paths through media: rays, their ways through media, density estimation along rays and on surfaces, shadow rays, each a kernel over jobs of a wave; and the first three in one kernel (the engine's own)",
         role: Role::PartOf("PM-SYS-1"),
         limits: "The fused form has the rays, their ways through media and the density estimation along them, in scenes with media, without queues, packets or a kd-tree; collisions of paths, surfaces and shadow rays stay stages of their own, whose push constants it has no room for beside its own, and what a quota stops is left to the stages.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.4")],

@@ -77,7 +77,7 @@ impl GlowStage {
         self.share
     }
 
-    /// Puts the photons of media that emit in their slots, which carry `placeless2` (`PhotonPlan::tells_lights`).
+    /// Puts the photons of media that emit in their slots, which carry `placeless2` (`PhotonPlan::carries_light_distance`).
     pub fn record(
         &self,
         pass: &mut Pass<'_>,

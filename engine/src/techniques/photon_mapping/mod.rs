@@ -17,7 +17,7 @@ mod tracer;
 pub mod volume;
 
 pub(super) use card::CARD;
-pub(super) use collisions::{CollisionPass, CollisionStage};
+pub(super) use collisions::{CollisionCounts, CollisionPass, CollisionStage};
 pub use gather::{GatherCounts, RayFetches};
 pub use map::{MapContents, map_contents};
 pub use mapper::{MappedEvent, MappedPhoton, MapperCounts, PhotonMapper};

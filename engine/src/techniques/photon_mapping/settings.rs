@@ -77,9 +77,8 @@ pub enum MapQueue {
     Blocks,
 }
 
-/// In how many kernels eye paths get what photons in media give them, bounce by bounce.
-///
-/// Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4.
+/// Whether the closest hits of eye rays, their ways through media and the queries along them are separate kernels (B. Fabianowski,
+/// "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.4) or one (the engine's own).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MapStages {
@@ -147,17 +146,21 @@ crate::settings! {
         /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there; or collisions and ways together, each
         /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin; in grids there are collisions alone.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
-        /// How far ways of photons are stored, of estimates that have some: to the next surface, weighted by what is left of light along them, or each as far as a flight comes, which is as light in
-        /// the band that comes farthest does. Short ones are fewer to meet, which takes less time and memory, and noisier.
+        /// How far photon beams reach: to the next surface (`long`), weighted by the transmittance along them, or each to a random end (`short`), drawn from the least extinct
+        /// band that scatters.
+        ///
+        /// Short beams take less time and memory and are noisier: take them where rays meet too many beams.
         pub volume_beams: BeamLength = BeamLength::Long;
         /// What a density grid leaves of light along an eye ray: a walk finds it by ratio tracking, the same for all photons that the ray sees, and unbiased for each; or a table of its
         /// logarithm at 64 places, which has no noise and takes as long in any grid, but errs by what the density does within a 64th of the way.
+        ///
+        /// Take the table where densities are smooth and the noise of walks shows.
         pub volume_transmittance: VolumeTransmittance = VolumeTransmittance::Walk;
         /// Kernels of photons in media have one radius, that of each photon's footprint, or that within which the nearest of the others lie, which the host finds.
         pub volume_kernel: VolumeKernel = VolumeKernel::Fixed;
-        /// Which of the other events of a medium, counted from the nearest, lies on the rim of a kernel in media by neighbours.
+        /// Of kernels by neighbours in media: as wide as the distance to the neighbour of this rank. More blur more and have less noise.
         ///
-        /// The source has 85; others that compare kernels by neighbours in media have 117.
+        /// B. Fabianowski, 2011, has 85; T. Engelhardt, 2013, §10.4, has 117.
         pub volume_neighbors: u32 = 85, in 1..=1000, unit "photons";
         /// Radius of fixed kernels of photons in media, greatest one of others, in the first pass; 0 chooses by what rays meet.
         ///
@@ -188,6 +191,8 @@ crate::settings! {
         pub queue: MapQueue = MapQueue::Slots;
         /// In scenes with media a kernel finds the closest hits of eye rays, and others their ways through media and what they see there, or one does all that; without media there is nothing to
         /// fuse. Never changes the picture. With slots and single queries alone, and not over a kd-tree.
+        ///
+        /// Compare both with `clerestory report volume-queues`; `fused` saves passes, and leaves what a quota stops to the separate kernels.
         pub stages: MapStages = MapStages::Stream;
         /// Who builds the map: the device, which needs shaderFloat64 and never reads photons back, or the host; auto is the device where
         /// it can. Never changes the picture.
@@ -382,7 +387,7 @@ impl PhotonSettings {
             even_survival: false,
             stores_lights: false,
             only_rough: false,
-            tells_lights: has_media && self.volume_paths,
+            carries_light_distance: has_media && self.volume_paths,
             stored: self.stored(),
         }
     }

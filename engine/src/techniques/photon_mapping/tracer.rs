@@ -117,8 +117,8 @@ struct Kit {
     stored: Stored,
     /// Of a pass.
     photons: u32,
-    /// [`PhotonPlan::tells_lights`].
-    tells_lights: bool,
+    /// [`PhotonPlan::carries_light_distance`].
+    carries_light_distance: bool,
     append: Box<dyn Append>,
     emit: ComputePipeline<photon_emit::Kernel>,
     scatter: ComputePipeline<photon_scatter::Kernel>,
@@ -173,7 +173,7 @@ impl PhotonTracer {
             tells_caustics: plan.tells_caustics,
             stores_lights: plan.stores_lights,
             only_rough: plan.only_rough,
-            tells_lights: plan.tells_lights,
+            carries_light_distance: plan.carries_light_distance,
             even_survival: plan.even_survival,
             has_media: profile.media.any(),
             has_classes: classes.is_some(),
@@ -233,7 +233,7 @@ impl PhotonTracer {
                 scene,
                 stored: plan.stored,
                 photons: plan.photons,
-                tells_lights: plan.tells_lights,
+                carries_light_distance: plan.carries_light_distance,
                 append,
             },
             gpu: gpu.clone(),
@@ -349,8 +349,8 @@ impl PhotonTracer {
         let traced = &mut tracing.traced;
         let volume = self.kit.volume.as_ref().map(VolumeTrace::counts).transpose()?;
         let [absorbed, events] = volume.unwrap_or_default();
-        let collided = self.kit.append.collisions().map(CollisionStage::counts).transpose()?;
-        let [collided, kept] = collided.unwrap_or_default();
+        let collisions = self.kit.append.collisions().map(CollisionStage::counts).transpose()?;
+        let collisions = collisions.unwrap_or_default();
         // What waits are the deposits with a kernel, and in scenes with media what comes from these besides.
         let records = match volume {
             Some(_) => counters.deposits - counters.without_kernel,
@@ -358,11 +358,11 @@ impl PhotonTracer {
         };
         traced.records = traced.records.saturating_add(records);
         traced.events = traced.events.saturating_add(events);
-        traced.counts.events += u64::from(events) + u64::from(kept);
+        traced.counts.events += u64::from(events) + u64::from(collisions.kept);
         traced.counts.collisions += walked.media.collisions;
         traced.counts.rays += walked.rays;
         traced.counts.escaped += u64::from(counters.escaped);
-        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed) + u64::from(collided);
+        traced.counts.absorbed += u64::from(counters.absorbed) + u64::from(absorbed) + u64::from(collisions.absorbed);
         traced.counts.deposits += u64::from(counters.deposits);
         traced.counts.without_kernel += u64::from(counters.without_kernel);
         tracing.first_photon += photons;
@@ -411,7 +411,7 @@ impl Kit {
     /// What photons of light without a place carry, m²; 0 where none tell their light.
     fn placeless2(&self) -> f32 {
         let [lower, upper] = self.scene.bounds().map(|corner| corner.as_dvec3());
-        if self.tells_lights {
+        if self.carries_light_distance {
             placeless_distance2(lower, upper) as f32
         } else {
             0.0

@@ -31,8 +31,8 @@ use crate::maps::{MapImage, Parametrization};
 use crate::scene::Environment;
 use crate::{Error, Result};
 
-/// Texels along a side of a cube's face over those of an octahedron, of finest filtered levels at most.
-const OF_OCTAHEDRON: u32 = 2;
+/// Texels along a side of an octahedron over those of a cube's face that stands in for it.
+const OCTAHEDRON_OVER_FACE: u32 = 2;
 
 /// What maps of probes are; both are in the world's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -57,7 +57,7 @@ impl ProbeMap {
     pub const fn last_side(self) -> u32 {
         match self {
             Self::Octahedron => 32,
-            Self::Cube => 32 / OF_OCTAHEDRON,
+            Self::Cube => 32 / OCTAHEDRON_OVER_FACE,
         }
     }
 
@@ -65,7 +65,7 @@ impl ProbeMap {
     const fn finest_max(self) -> u32 {
         match self {
             Self::Octahedron => 256,
-            Self::Cube => 256 / OF_OCTAHEDRON,
+            Self::Cube => 256 / OCTAHEDRON_OVER_FACE,
         }
     }
 
@@ -361,8 +361,8 @@ mod tests {
         let both = |side: u32, finest: u32| {
             let cube = LightProbeDesc {
                 map: ProbeMap::Cube,
-                side: side / OF_OCTAHEDRON,
-                finest: finest / OF_OCTAHEDRON,
+                side: side / OCTAHEDRON_OVER_FACE,
+                finest: finest / OCTAHEDRON_OVER_FACE,
             };
             let map = ProbeMap::Octahedron;
             [LightProbeDesc { map, side, finest }, cube]

@@ -16,6 +16,8 @@ mod chain_tests;
 mod footprint_tests;
 pub mod path_differentials;
 #[cfg(test)]
+pub(crate) mod test_surfaces;
+#[cfg(test)]
 pub(crate) mod testing;
 
 use super::warp::orthonormal_basis;

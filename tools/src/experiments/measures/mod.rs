@@ -111,6 +111,7 @@ measures! {
     on_device "cycles" rendering::cycles;
     on_device "deferred-stages" virtual_lights::deferred_stages;
     on_device "device-model" device::device_model;
+    on_device "fog-peers" rendering::fog_peers;
     on_host "free-flight" media::free_flight;
     on_device "fresnel-cost" surfaces::fresnel_cost;
     on_host "fresnel-dielectric" surfaces::fresnel_dielectric;
@@ -191,6 +192,7 @@ measures! {
     on_host "virtual-images" impostors::virtual_images;
     on_device "upsampling" preview::upsampling;
     on_device "view-shadows" preview::view_shadows;
+    on_host "volume-bands" media::volume_bands;
     on_device "volume-bandwidths" photons::volume_bandwidths;
     on_device "volume-choice" photons::volume_choice;
     on_device "volume-crossover" photons::volume_crossover;

@@ -96,7 +96,7 @@ pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
     reasons(&[
         (
             profile.media.any(),
-            "the scene has participating media, and virtual lights lie on surfaces only",
+            "the scene has participating media, and this technique's virtual lights lie on surfaces only; technique `vpl` has them at collisions, too",
         ),
         (
             profile.has_unlit,

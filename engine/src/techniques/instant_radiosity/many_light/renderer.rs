@@ -470,7 +470,7 @@ impl Indirect {
             even_survival: false,
             stores_lights: true,
             only_rough: settings.has_further_bounces(),
-            tells_lights: false,
+            carries_light_distance: false,
             stored: settings.stored(),
         };
         let fewer = match settings.placement {

@@ -64,6 +64,6 @@ pub(in crate::techniques) struct PhotonPlan {
     /// Photons are scattered by diffuse and glossy lobes alone: one specular scattering makes another path set.
     pub only_rough: bool,
     /// They carry how far their light is from their first scattering, and records beside ways in media have it.
-    pub tells_lights: bool,
+    pub carries_light_distance: bool,
     pub stored: Stored,
 }

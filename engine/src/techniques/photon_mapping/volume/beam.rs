@@ -153,7 +153,7 @@ impl Beam {
                     beams: settings.volume.stores_ways(),
                     planes: settings.volume.stores_planes(),
                     points: settings.volume.stores_points(),
-                    tells_lights: settings.volume_paths,
+                    carries_light_distance: settings.volume_paths,
                     compact_quota: settings.query_quota.min(BEAM_QUOTA),
                     count_fetches: settings.count_fetches,
                     counts_bounces,

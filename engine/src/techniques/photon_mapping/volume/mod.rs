@@ -14,6 +14,8 @@
 //! no events beyond; a thin wall lets them through. Both fade as kernels shrink. Planes have none: what they carry is unbiased, the rest comes by beams.
 
 mod beam;
+#[cfg(test)]
+mod chain_tests;
 pub mod event;
 pub mod footprint;
 mod map;
@@ -162,6 +164,8 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/volume/event.rs::boxes_hold_what_rays_find_within_the_radius",
             "tests/tests/twins/photons.rs::records_of_events_agree_with_their_twins",
             "tests/tests/photon/volume.rs::airlight_has_its_six_constants",
+            "tests/tests/photon/volume_kernels.rs::no_phase_function_is_mirrored",
+            "tests/tests/photon/volume_truths.rs::media_scatter_what_they_take_in_furnaces",
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
             "tests/tests/photon/volume.rs::grids_agree_with_the_path_tracer",
             "tests/tests/photon/volume.rs::glass_in_fog_agrees_with_the_path_tracer",
@@ -351,8 +355,13 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/volume/footprint.rs::scattering_keeps_the_expected_volume",
             "engine/src/techniques/photon_mapping/volume/footprint.rs::scaling_the_scene_and_the_unit_scales_the_kernel",
             "engine/src/techniques/photon_mapping/volume/footprint.rs::footprints_without_a_volume_have_the_least_kernel_and_endless_ones_the_greatest",
+            "engine/src/techniques/photon_mapping/volume/chain_tests.rs::each_event_in_media_agrees_with_finite_differences",
+            "engine/src/techniques/photon_mapping/volume/chain_tests.rs::chains_of_events_in_media_agree_with_finite_differences",
+            "engine/src/techniques/photon_mapping/volume/chain_tests.rs::footprints_that_forget_who_has_collided_are_too_small",
             "tests/tests/photon/volume.rs::kernels_from_footprints_hold_as_many_collisions_as_they_should",
             "tests/tests/photon/volume.rs::kernels_from_footprints_agree_with_the_path_tracer",
+            "tests/tests/photon/volume_footprints.rs::kernels_in_nested_bodies_are_those_of_all_that_photons_have_passed",
+            "tests/tests/photon/volume_footprints.rs::kernels_behind_glass_are_those_of_refracted_footprints",
             "tests/tests/twins/photons.rs::footprints_in_media_agree_with_their_twins",
         ],
         settings: &["volume_kernel", "volume_spread", "volume_dampening"],

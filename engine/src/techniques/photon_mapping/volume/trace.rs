@@ -125,7 +125,7 @@ impl VolumeTrace {
             sampler_kind: plan.sampler as u32,
             has_differentials: plan.follows_footprints,
             has_classes: options.has_classes,
-            tells_lights: plan.tells_lights,
+            carries_light_distance: plan.carries_light_distance,
             short_ways: options.beams == BeamLength::Short,
             stores_ways,
             stores_planes,

@@ -20,6 +20,7 @@ pub mod volume_crossover;
 pub mod volume_dampening;
 pub mod volume_frame;
 pub mod volume_peers;
+mod volume_queue_stages;
 pub mod volume_queues;
 pub mod volume_scenes;
 pub mod volume_transmittance;

@@ -24,7 +24,7 @@ const SCENES: [&str; 4] = [
     "builtin:fog-box?sphere=glass&boxes=none",
     "builtin:smoke",
 ];
-/// Light that was scattered twice or more, in a medium at last.
+/// Light that was scattered twice or more, the last time in a medium.
 const PATHS: &str = "L.+VE";
 /// Pixels a side, and samples a pixel of references.
 const FULL: (u32, u32) = (32, 8192);

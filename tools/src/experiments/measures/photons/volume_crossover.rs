@@ -20,7 +20,7 @@ use crate::experiments::measures::pictures::{finished, mean_picture};
 use crate::experiments::plot::Curve;
 use crate::timing::timed;
 
-/// Light that was scattered twice in the fog at last, which all three see in their own way.
+/// Light whose last two scatterings are in the fog, which all three see in their own way.
 const PATHS: &str = "L.*VVE";
 /// Scattering coefficients of the fog in a box of 0.55 m, 1/m; a tenth of each is absorbed.
 const SCATTERING: [f64; 5] = [0.5, 2.0, 8.0, 32.0, 128.0];
@@ -169,15 +169,15 @@ impl Study for Found {
                 lines,
             )
             .note(format!(
-                "{0} × {0} pixels, {1} passes of {2} photons; {TURNS} turns of {PICTURES} pictures, whose spread is the variance, over the square of their common mean. Light that was scattered twice in \
-                 the fog at last, under kernels of one radius that do not shrink.",
+                "{0} × {0} pixels, {1} passes of {2} photons; {TURNS} turns of {PICTURES} pictures, whose spread is the variance, over the square of their common mean. Light whose last two \
+                 scatterings are in the fog, under kernels of one radius that do not shrink.",
                 FULL.0, FULL.2, FULL.1,
             ))
             .and(Findings::of(&crossings, &[]))
             .note(
                 "By a line through the logarithms of all rows. A way is met wherever a ray passes within the radius, in which its weight is one over the width of the strip, and a collision within a disk, \
                  whose weight is one over its area, and only where a photon collides: the ratio of variances goes with the radius over the mean free path, whatever the density by itself. In dense media a way \
-                 is long beside where its light is, and most of what rays meet of it is dim. That is the order that SmallUPBP, Tungsten and GPUUPBP show; what differs is the price of a way beside that of a \
+                 is long beside where its light is, and most of what rays meet of it is dim. That is the order that Křivánek et al. 2014 (SmallUPBP) and Bitterli and Jarosz 2017 (Tungsten) publish; what differs is the price of a way beside that of a \
                  collision, for which the second line stands.",
             )
     }

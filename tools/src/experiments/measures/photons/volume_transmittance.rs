@@ -6,12 +6,13 @@
 use clerestory::Result;
 use clerestory::gpu::Gpu;
 use clerestory::gpu::shaders::constants::WAY_PLACES;
-use clerestory::scene::{DensityGrid, LightKind, Material, Medium, Scene};
+use clerestory::scene::Scene;
 use clerestory::techniques::photon_mapping::PhotonSettings;
 use clerestory::techniques::photon_mapping::volume::transmittance::VolumeTransmittance;
 use clerestory::transport::random::SamplerKind;
-use clerestory_hard_cases::scenes::{camera_down, floor};
-use glam::{DAffine3, DVec3, Vec3};
+use clerestory_hard_cases::scenes::{
+    DensityProfile, PROFILE_FACES, PROFILE_SIGMA, density_profiles, floor_under, profile_grid,
+};
 
 use super::cases::mapper;
 use crate::experiments::findings::{Bound, Criterion, Findings, Study, change, largest, rows};
@@ -21,11 +22,6 @@ use crate::experiments::measures::errors::mean_with_error;
 /// Pixels a side, and rays of each: in full, and in a smoke run.
 const FULL: (u32, u32) = (32, 256);
 const SMOKE: (u32, u32) = (4, 16);
-/// Extinctions of the bands at a density of 1, 1/m; grids are a metre high.
-const SIGMA: [f32; 3] = [0.5, 1.0, 2.0];
-/// Faces of the grids above the floor, m.
-const LOW: f64 = 0.5;
-const HIGH: f64 = 1.5;
 /// How far aside the grid is that rays miss, m.
 const ASIDE: f64 = 100.0;
 /// Photons, and the radius of their kernels, m: the floor's light is the same in both pictures, whatever these are.
@@ -36,36 +32,6 @@ const WALK: &str = "walk";
 const TABLE: &str = "table";
 const ESTIMATES: [(&str, VolumeTransmittance); 2] =
     [(WALK, VolumeTransmittance::Walk), (TABLE, VolumeTransmittance::Table)];
-
-/// A profile of densities.
-struct Profile {
-    name: &'static str,
-    values: Vec<f32>,
-}
-
-/// Waves that fill blocks of the bound unevenly, one dense cell of twelve, and a layer thinner than the places of a table are apart.
-fn profiles() -> [Profile; 3] {
-    let waves = (0..12).map(|i| 1.0 + 0.9 * (7.0 * (f64::from(i) + 0.5) / 12.0).sin() as f32);
-    let dense = |cells: usize, at: usize, background: f32, density: f32| {
-        let mut values = vec![background; cells];
-        values[at] = density;
-        values
-    };
-    [
-        Profile {
-            name: "waves",
-            values: waves.collect(),
-        },
-        Profile {
-            name: "one dense cell of twelve",
-            values: dense(12, 5, 0.1, 9.0),
-        },
-        Profile {
-            name: "a layer of a 512th",
-            values: dense(1024, 512, 1.0, 1024.0),
-        },
-    ]
-}
 
 rows! {
     /// An estimate of a transmittance.
@@ -114,8 +80,8 @@ impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
         let form = context.pick(FULL, SMOKE);
-        let name = |profile: &Profile| profile.name.to_owned();
-        let all = context.each(&profiles(), name, |profile| {
+        let name = |profile: &DensityProfile| profile.name.to_owned();
+        let all = context.each(&density_profiles(), name, |profile| {
             let of = |estimate: &(&str, VolumeTransmittance)| rows_of(&gpu, profile, *estimate, form);
             Ok(ESTIMATES.iter().map(of).collect::<Result<Vec<_>>>()?.concat())
         })?;
@@ -136,35 +102,6 @@ impl Study for Found {
     }
 }
 
-fn grid(values: &[f32], aside: f64) -> DensityGrid {
-    let grid = DensityGrid {
-        size: [1, values.len() as u32, 1],
-        values: values.to_vec(),
-        to_world: DAffine3::IDENTITY,
-    };
-    grid.in_box(DVec3::new(aside - 1.0, LOW, -1.0), DVec3::new(aside + 1.0, HIGH, 1.0))
-}
-
-/// The floor with a grid over what is seen of it, or so far aside.
-fn floor_under(values: &[f32], aside: f64) -> Scene {
-    let mut scene = Scene {
-        name: "floor under a grid".into(),
-        ..Scene::default()
-    };
-    let white = scene.add_material(Material::lambert("white", Vec3::splat(0.8)));
-    scene.place(floor("floor", white, 1.5, 0.0));
-    scene.media.push(Medium {
-        sigma_a: Vec3::from_array(SIGMA),
-        density: Some(grid(values, aside)),
-        ..Medium::default()
-    });
-    scene.surrounding = Some(0);
-    scene.cameras.push(camera_down(0.3, 5.0));
-    let (position, intensity) = (Vec3::new(0.5, 0.3, 0.4), Vec3::ONE);
-    scene.add_light("light", LightKind::Point { position, intensity });
-    scene
-}
-
 /// The floor's picture, and look-ups of the density a ray.
 fn seen(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, side: u32) -> Result<(Vec<f32>, f64)> {
     let mut mapper = mapper(gpu, scene, [side; 2], settings.clone())?;
@@ -177,7 +114,7 @@ fn seen(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, side: u32) -> Resul
 
 fn rows_of(
     gpu: &Gpu,
-    profile: &Profile,
+    profile: &DensityProfile,
     (estimate, volume_transmittance): (&str, VolumeTransmittance),
     (side, rays): (u32, u32),
 ) -> Result<Vec<Row>> {
@@ -192,10 +129,11 @@ fn rows_of(
         volume_transmittance,
         ..PhotonSettings::default()
     };
-    let (through, look_ups) = seen(gpu, &floor_under(&profile.values, 0.0), &settings, side)?;
-    let (beside, _) = seen(gpu, &floor_under(&profile.values, ASIDE), &settings, side)?;
-    let depth = grid(&profile.values, 0.0).mean() * (HIGH - LOW);
-    let rows = SIGMA.into_iter().enumerate().map(|(band, sigma)| {
+    let (through, look_ups) = seen(gpu, &floor_under(profile, 0.0), &settings, side)?;
+    let (beside, _) = seen(gpu, &floor_under(profile, ASIDE), &settings, side)?;
+    let [low, high] = PROFILE_FACES;
+    let depth = profile_grid(profile, 0.0).mean() * (high - low);
+    let rows = PROFILE_SIGMA.into_iter().enumerate().map(|(band, sigma)| {
         let pixels = through.chunks_exact(3).zip(beside.chunks_exact(3));
         let left: Vec<f64> = pixels
             .map(|(through, beside)| f64::from(through[band]) / f64::from(beside[band]))
@@ -221,15 +159,18 @@ fn rows_of(
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     #[test]
     fn grids_have_the_mean_of_their_cells_along_rays() {
         const STEPS: u32 = 1 << 16;
-        for profile in profiles() {
-            let density = grid(&profile.values, 0.0);
-            let step = (HIGH - LOW) / f64::from(STEPS);
-            let at = |i: u32| density.density(DVec3::Y * (LOW + (f64::from(i) + 0.5) * step));
+        let [low, high] = PROFILE_FACES;
+        for profile in density_profiles() {
+            let density = profile_grid(&profile, 0.0);
+            let step = (high - low) / f64::from(STEPS);
+            let at = |i: u32| density.density(DVec3::Y * (low + (f64::from(i) + 0.5) * step));
             let sum: f64 = (0..STEPS).map(at).sum();
             assert!((sum * step / density.mean() - 1.0).abs() < 1e-6, "{}", profile.name);
         }

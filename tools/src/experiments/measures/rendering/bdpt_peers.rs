@@ -7,21 +7,19 @@
 use std::path::Path;
 use std::process::Command;
 
-use clerestory::film::picture;
 use clerestory::gpu::Gpu;
 use clerestory::input::read_file;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::{Error, Result, atomic, scene};
 
-use crate::agreement::{python_of_environment, spread};
+use super::peers::{Asked, Contender, FILE_MAX, LUXCORE_SCRIPTS, Turn, luxcore_turn, our_turn, pictures_of};
+use crate::agreement::python_of_environment;
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::errors::mean_with_error;
 use crate::experiments::measures::pictures::mean_of;
 use crate::experiments::reference::short_name;
 use crate::mitsuba::{self, ExportOptions};
 use crate::python;
-use crate::timing::{median, timed};
 
 const SCENES: [&str; 4] = [
     "builtin:shaded-lamp",
@@ -42,19 +40,9 @@ const MITSUBA: usize = 1;
 /// Each renderer's turns, and its pictures in each.
 const TURNS: usize = 5;
 const PICTURES: u32 = 2;
-const SCRIPTS: [(&str, &str); 3] = [
-    ("photons.py", include_str!("../../../../mitsuba/photons.py")),
-    (SCRIPT, include_str!("../../../../mitsuba/bidirectional.py")),
-    (MITSUBA_SCRIPT, include_str!("../../../../mitsuba/reference.py")),
-];
-const SCRIPT: &str = "bidirectional.py";
+const MITSUBA_SCRIPTS: [(&str, &str); 1] = [(MITSUBA_SCRIPT, include_str!("../../../../mitsuba/reference.py"))];
 const MITSUBA_SCRIPT: &str = "reference.py";
-const NEEDED: &str = "pyluxcore; see tools/mitsuba/README.md";
 const MITSUBA_NEEDED: &str = "Mitsuba 3; see tools/mitsuba/README.md";
-/// Bytes of a turn's pictures at most.
-const FILE_MAX: u64 = 1 << 28;
-/// Standard errors to each side of an interval.
-const MARGIN: f64 = 2.0;
 
 rows! {
     /// Both renderers on a scene.
@@ -125,13 +113,6 @@ const CRITERIA: &[Criterion<Row>] = &[Criterion::each(
 )
 .needs("LuxCore")];
 
-/// What the script prints.
-#[derive(serde::Deserialize)]
-struct Answer {
-    version: String,
-    seconds: Vec<f64>,
-}
-
 /// What Mitsuba's script writes, as far as it is needed here.
 #[derive(serde::Deserialize)]
 struct MitsubaAnswer {
@@ -140,71 +121,11 @@ struct MitsubaAnswer {
     seconds_each: Vec<f64>,
 }
 
-/// Pictures of a turn, with the seconds of each.
-type Turn = Vec<(Vec<f32>, f64)>;
-
-/// One renderer's turns.
-#[derive(Clone)]
-struct Contender {
-    seconds: Repeats,
-    error: Measured,
-    /// Relative standard error of the time to an error.
-    uncertainty: f64,
-    mean: f64,
-    /// Standard error of the mean.
-    mean_error: f64,
-}
-
-impl Contender {
-    /// None where there are too few pictures.
-    fn of(turns: Vec<Turn>) -> Option<Self> {
-        let of_turn = |turn: &Turn| median(turn.iter().map(|(_, seconds)| *seconds).collect());
-        let seconds: Repeats = turns.iter().filter(|turn| !turn.is_empty()).map(of_turn).collect();
-        let pictures: Vec<Vec<f32>> = turns.into_iter().flatten().map(|(picture, _)| picture).collect();
-        let count = pictures.len() as f32;
-        let values = pictures.first()?.len();
-        let mean: Vec<f32> = (0..values)
-            .map(|i| pictures.iter().map(|one| one[i]).sum::<f32>() / count)
-            .collect();
-        let found = spread::measure(&pictures, &mean)?;
-        let middle = median(seconds.0.clone());
-        let deviation = seconds.0.iter().map(|s| (s / middle - 1.0).powi(2)).sum::<f64>();
-        let means: Vec<f64> = pictures.iter().map(|one| mean_of(one)).collect();
-        let [of_all, mean_error] = mean_with_error(&means);
-        let of_seconds = (deviation / (seconds.0.len() as f64 - 1.0).max(1.0) / seconds.0.len() as f64).sqrt();
-        Some(Self {
-            mean: of_all,
-            mean_error,
-            error: Measured::within(found.relative_mse, MARGIN * found.standard_error),
-            uncertainty: (found.standard_error / found.relative_mse).hypot(of_seconds),
-            seconds,
-        })
-    }
-
-    /// Seconds to a relative MSE of 1, as that falls with one over time.
-    fn cost(&self) -> f64 {
-        median(self.seconds.0.clone()) * self.error.value
-    }
-
-    /// Another one's time to equal error over this one's.
-    fn time_of(&self, other: &Self) -> Measured {
-        let ratio = other.cost() / self.cost();
-        Measured::within(ratio, MARGIN * ratio * self.uncertainty.hypot(other.uncertainty))
-    }
-
-    /// The mean over another one's.
-    fn brightness_over(&self, other: &Self) -> Measured {
-        let ratio = self.mean / other.mean;
-        let error = (self.mean_error / self.mean).hypot(other.mean_error / other.mean);
-        Measured::within(ratio, MARGIN * ratio * error)
-    }
-}
-
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
         let python = python_of_environment();
-        for (name, text) in SCRIPTS {
+        for (name, text) in LUXCORE_SCRIPTS.into_iter().chain(MITSUBA_SCRIPTS) {
             atomic::write(&context.file(name)?, text.as_bytes())?;
         }
         let mut found = Self::default();
@@ -257,7 +178,16 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> R
     let turns = context.in_turns(TURNS, contenders, |i| {
         seed += PICTURES + 1;
         let Some(peer) = i.checked_sub(OURS.len()) else {
-            let (turn, of_turn) = our_turn(context, &renderer, OURS[i], seed)?;
+            let (technique, samples) = OURS[i];
+            let options = RenderOptions {
+                technique: Some(technique.into()),
+                size: [side; 2],
+                spp: context.pick(samples[0], samples[1]),
+                seed,
+                settings: serde_json::json!({ "sampler": "pcg" }).into(),
+                ..RenderOptions::default()
+            };
+            let (turn, of_turn) = our_turn(&renderer, &options, PICTURES)?;
             if i == 0 {
                 passes = of_turn;
             }
@@ -268,7 +198,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> R
         }
         let answer = match &exported {
             Ok(exported) if peer == LUXCORE => {
-                their_turn(context, python, ("BIDIRCPU", &exported.scene), &folder, seed)
+                luxcore_turn(context, &asked(context, python, "BIDIRCPU", &exported.scene), seed)
             }
             Ok(exported) => mitsuba_turn(context, python, &exported.scene, &folder, seed),
             Err(cause) => Err(Error::setting("scene", address, cause.to_string())),
@@ -304,8 +234,8 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> R
     if let (Some(ours), Ok(theirs)) = (contender(0), luxcore) {
         // What fails here costs a number, not the scene.
         let turn = exported.as_ref().ok().and_then(|exported| {
-            let paths = ("PATHCPU", exported.scene.as_path());
-            their_turn(context, python, paths, &folder, seed).ok()
+            let paths = asked(context, python, "PATHCPU", &exported.scene);
+            luxcore_turn(context, &paths, seed).ok()
         });
         let of_paths = turn.map_or(f64::NAN, |(turn, _)| {
             let means = turn.iter().map(|(picture, _)| mean_of(picture));
@@ -351,51 +281,17 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> R
     Ok(found)
 }
 
-/// Milliseconds of a picture's passes, by name.
-type PassTimes = Vec<(String, f64)>;
-
-/// A turn of a technique of ours, and the passes of its last picture.
-fn our_turn(
-    context: &Context<'_>,
-    renderer: &Renderer,
-    (technique, samples): (&str, [u32; 2]),
-    seed: u32,
-) -> Result<(Turn, PassTimes)> {
-    let (mut turn, mut passes) = (Turn::new(), PassTimes::new());
-    for picture in 0..PICTURES {
-        let options = RenderOptions {
-            technique: Some(technique.into()),
-            size: [context.pick(SIDE, SMOKE_SIDE); 2],
-            spp: context.pick(samples[0], samples[1]),
-            seed: seed + picture,
-            settings: serde_json::json!({ "sampler": "pcg" }).into(),
-            ..RenderOptions::default()
-        };
-        let (rendered, seconds) = timed(|| renderer.render(&options));
-        let rendered = rendered?;
-        passes = rendered
-            .report
-            .passes
-            .iter()
-            .filter_map(|pass| Some((pass.name.clone(), pass.gpu_ms?)))
-            .collect();
-        let radiance = rendered.picture.require(picture::RADIANCE)?.values().to_vec();
-        turn.push((radiance, seconds));
+/// What LuxCore is asked for on a scene.
+fn asked<'a>(context: &Context<'_>, python: &'a Path, engine: &'a str, scene: &'a Path) -> Asked<'a> {
+    Asked {
+        python,
+        engine,
+        scene,
+        side: context.pick(SIDE, SMOKE_SIDE),
+        samples: context.pick(SAMPLES, SMOKE_SAMPLES),
+        pictures: PICTURES,
+        further: &[],
     }
-    Ok((turn, passes))
-}
-
-/// Pictures of so many pixels a side from a file of 32-bit floats.
-fn pictures_of(file: &Path, side: u32) -> Result<Vec<Vec<f32>>> {
-    let bytes = read_file(file, FILE_MAX)?;
-    let values: Vec<f32> = bytes
-        .as_chunks::<4>()
-        .0
-        .iter()
-        .map(|word| f32::from_le_bytes(*word))
-        .collect();
-    let pictures = values.chunks_exact(3 * (side * side) as usize);
-    Ok(pictures.map(<[f32]>::to_vec).collect())
 }
 
 /// A turn of Mitsuba's path tracer, and its version.
@@ -424,33 +320,4 @@ fn mitsuba_turn(
     let pictures = pictures_of(&prefix.with_extension("f32"), context.pick(SIDE, SMOKE_SIDE))?;
     let version = format!("{}, {}", answer.renderer, answer.variant);
     Ok((pictures.into_iter().zip(answer.seconds_each).collect(), version))
-}
-
-/// A turn of LuxCore's, and its version.
-fn their_turn(
-    context: &Context<'_>,
-    python: &Path,
-    (engine, scene): (&str, &Path),
-    folder: &Path,
-    seed: u32,
-) -> Result<(Turn, String)> {
-    let side = context.pick(SIDE, SMOKE_SIDE);
-    let file = folder.join("luxcore.f32");
-    let mut command = Command::new(python);
-    command
-        .arg(context.folder.join(SCRIPT))
-        .args([scene.as_os_str(), file.as_os_str()])
-        .args(["--size", &side.to_string()])
-        .args(["--samples", &context.pick(SAMPLES, SMOKE_SAMPLES).to_string()])
-        .args(["--pictures", &PICTURES.to_string()])
-        .args(["--engine", engine])
-        // Seeds of engines are above 0.
-        .args(["--seed", &(seed + 1).to_string()]);
-    let Some(text) = python::run(python, &mut command, NEEDED, context.watch)? else {
-        return Ok((Turn::new(), String::new()));
-    };
-    let answer: Answer =
-        serde_json::from_str(&text).map_err(|cause| Error::setting("luxcore", text, cause.to_string()))?;
-    let pictures = pictures_of(&file, side)?;
-    Ok((pictures.into_iter().zip(answer.seconds).collect(), answer.version))
 }
