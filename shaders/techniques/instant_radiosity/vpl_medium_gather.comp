@@ -225,8 +225,7 @@ bool pass_stretch(Ray ray, uvec4 key, inout MediumGatherState at) {
             GridWalk walk = begin_grid_walk(m, ray.origin, ray.direction, at.start, at.hit.t);
             walk.draw = at.grid_walks << RATIO_WALK_SHIFT;
             ++at.grid_walks;
-            // A quota for each stretch: where walks stop does not depend on how many share a dispatch.
-            uint iterations = GRID_WALK_QUOTA;
+            uint iterations = CONNECTION_GRID_QUOTA;
             uint outcome = ratio_tracking(m, key, scale, walk, iterations, at.transmittance);
             float reached = resumed_start(at.start, walk.entry + walk.t);
             // The search that goes on from the surface itself would miss it.
