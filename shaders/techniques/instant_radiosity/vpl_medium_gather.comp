@@ -304,6 +304,7 @@ void main() {
     uint slot = load_slot(place);
     MediumReceiver r;
     if (!begin_receiver(slot, place, r)) {
+        count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
         return;
     }
     MediumGatherState at =

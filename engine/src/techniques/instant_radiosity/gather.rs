@@ -162,7 +162,7 @@ impl Gather {
             bounces: [settings.least_bounces, settings.most().unwrap_or(u32::MAX)],
             edge_bound,
             selected,
-            pace: StoppedPace::new(gpu.caps().kind, lights_at_once),
+            pace: StoppedPace::new(gpu.caps().kind, lights_at_once, scene.profile().media.heterogeneous),
         })
     }
 
