@@ -5,10 +5,11 @@
 use super::volume::{coloured, lit_box, uneven};
 use super::*;
 use clerestory::gpu::shaders::constants::WAY_PLACES;
+use clerestory::gpu::{GpuOptions, Lesser};
 use clerestory::scene::{DensityGrid, Medium};
 use clerestory::techniques::photon_mapping::volume::transmittance::VolumeTransmittance;
 use clerestory_tests::statistics::expect_mean_of;
-use clerestory_tests::with_gpu;
+use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
 use glam::{DAffine3, DVec3};
 
 /// Extinction of a density of 1, 1/m; grids are a metre high.
@@ -182,6 +183,32 @@ fn tables_are_kept_for_queries_that_a_quota_stops() {
             assert!((a - b).abs() <= 1e-5 * a, "{i}: {b}, not {a}");
         }
     });
+}
+
+/// Where memory lacks, fewer eye paths are under way at once, so that there is room for what is kept of their ways through a grid.
+#[test]
+fn waves_shrink_until_ways_through_grids_fit_beside_them() {
+    // Of the 74 MiB that the ways of a whole wave take, and what half a wave spares of them at least.
+    const LACKING: u64 = 1 << 25;
+    let of = |heap_bytes| {
+        let lesser = Lesser {
+            heap_bytes,
+            ..Lesser::default()
+        };
+        let gpu = gpu_with(&GpuOptions {
+            lesser,
+            ..GpuOptions::default()
+        });
+        let mut mapper = mapper(&gpu, &lit_box(uneven(coloured())), &tabulated("all", 1 << 10));
+        let used = gpu.memory_report().total();
+        let picture = bits(&advance(&mut mapper, 2));
+        assert_no_messages(&gpu);
+        (used, picture)
+    };
+    let (whole, picture) = of(None);
+    let (used, of_fewer) = of(Some(whole - LACKING));
+    assert_eq!(of_fewer, picture);
+    assert!(used + LACKING < whole, "{used} of {whole}");
 }
 
 #[test]

@@ -65,6 +65,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/techniques/photon_mapping/volume/transmittance.rs::steps_vary_less_than_delta_tracking_and_are_bounded",
             "tests/tests/photon/grid_transmittance.rs::walks_have_the_exact_transmittance_and_vary_less_than_delta_tracking",
             "tests/tests/photon/grid_transmittance.rs::homogeneous_media_have_the_same_bits_by_either",
+            "tests/tests/photon/grid_transmittance.rs::waves_shrink_until_ways_through_grids_fit_beside_them",
             "tests/tests/photon/volume.rs::grids_agree_with_the_path_tracer",
             "tests/tests/photon/volume_queues.rs::queues_and_packets_wait_for_walks_through_grids",
             "tests/tests/twins/photons.rs::steps_through_grids_agree_with_their_twins",
