@@ -87,6 +87,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/grid_transmittance.rs::tables_err_by_what_lies_between_their_places",
             "tests/tests/photon/grid_transmittance.rs::tables_agree_with_the_path_tracer",
             "tests/tests/photon/grid_transmittance.rs::tables_are_kept_for_queries_that_a_quota_stops",
+            "tests/tests/photon/grid_transmittance.rs::the_sky_behind_a_grid_needs_no_table",
             "tests/tests/photon/grid_transmittance.rs::homogeneous_media_have_the_same_bits_by_either",
         ],
         settings: &["volume_transmittance"],
