@@ -11,6 +11,10 @@
 #include "scene/media.glsl"
 #include "transport/phase.glsl"
 
+// Iterations of a shadow ray's walk through a grid in one stretch. Each has as many, so that where walks stop does not depend on how many stretches share a dispatch; few, since
+// those of all lanes and stretches add up to what software drivers run.
+const uint CONNECTION_GRID_QUOTA = 64u;
+
 // A point that virtual lights light: of a collision the position, the way there and the body are known alone, and the frame is none.
 struct MediumReceiver {
     Receiver at;

@@ -200,8 +200,7 @@ bool pass_stretch(Ray ray, uvec4 key, inout MediumGatherState at) {
             GridWalk walk = begin_grid_walk(m, ray.origin, ray.direction, at.start, at.hit.t);
             walk.draw = at.grid_walks << RATIO_WALK_SHIFT;
             ++at.grid_walks;
-            // A quota for each stretch: where walks stop does not depend on how many share a dispatch.
-            uint iterations = GRID_WALK_QUOTA;
+            uint iterations = CONNECTION_GRID_QUOTA;
             uint outcome = ratio_tracking(m, key, scale, walk, iterations, at.transmittance);
             float reached = resumed_start(at.start, walk.entry + walk.t);
             // The search that goes on from the surface itself would miss it.
@@ -280,6 +279,7 @@ void main() {
     uint slot = load_slot(place);
     MediumReceiver r;
     if (!begin_receiver(slot, place, r)) {
+        count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
         return;
     }
     MediumGatherState at =

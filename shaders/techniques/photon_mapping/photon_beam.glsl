@@ -212,9 +212,11 @@ bool prepare_beam(uint slot, uint place, WalkState path, uint resume) {
     }
     bool walks;
     bool asks = begin_beam(slot, place, path, load_hit(place), resume == BEAM_WALKING, walks);
+    if (!asks) {
+        count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
+    }
     if (walks) {
         walk_resume[place] = BEAM_WALKING;
-        count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
         leave_for_later(STALLED_ARRIVAL);
     }
     return asks;

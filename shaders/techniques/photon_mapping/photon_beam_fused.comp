@@ -45,8 +45,10 @@ void main() {
     bool walks;
     bool asks = begin_beam(slot, place, path, hit, false, walks);
     walk_resume[place] = walks ? BEAM_WALKING : BEAM_DONE;
-    if (walks) {
+    if (!asks) {
         count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
+    }
+    if (walks) {
         leave_for_later(STALLED_EXTEND);
     }
     if (asks && !ask_beam(slot, place, path)) {

@@ -1,7 +1,7 @@
 // The ways of eye paths through media whose photons they ask for: where a way begins and ends, in which medium, and what the medium leaves of light along it and from the
 // surface behind it. Shared by the queries of the volume map (photon_beam.glsl) and by the stage before those that have a queue (photon_beam_ways.comp).
 //
-// Transmittances are exact in homogeneous media. In a grid one walk a ray, by ratio tracking, leaves the product of its steps so far at each of these: unbiased for light from
+// Transmittances are exact in homogeneous media. In a grid one walk a ray, of those that ask or meet a surface, by ratio tracking, leaves the product of its steps so far at each of these: unbiased for light from
 // every place (photon_transmittance.glsl). One that its quota stops goes on in a later dispatch, before anything is asked. Or a table has the ray's optical lengths at places as far apart
 // (TABULATES), by the density midway between them, in between by lines: without noise, but wrong where the density is not straight within that. A way that path_medium.comp goes through in
 // several rounds is asked for once: `beam_asked` says how far.
@@ -138,13 +138,13 @@ vec3 passed_to(float t) {
     return transmittance(beam.m.sigma_t, t - beam.start);
 }
 
-// Fills the table of a ray as far as `end`.
-void tabulate(float end) {
+// The integral of the density along a ray as far as `end`, m; for rays that ask (`stores`) the table of it, too.
+float tabulate(float end, bool stores) {
     GridWalk walk = begin_grid_walk(beam.m, beam.origin, beam.direction, beam.start, end);
     beam.entry = walk.entry;
     beam.spacing = max(walk.t_end, 0.0) / float(WAY_PLACES);
     if (beam.spacing == 0.0) {
-        return;
+        return 0.0;
     }
     float so_far = 0.0;
     for (uint i = 0u; i < WAY_STEPS; ++i) {
@@ -154,14 +154,17 @@ void tabulate(float end) {
             so_far += beam.spacing * grid_density(beam.m, walk);
             lengths[j] = so_far;
         }
-        way_steps[beam.first_step + i] = lengths;
+        if (stores) {
+            way_steps[beam.first_step + i] = lengths;
+        }
     }
     grid_iterations += WAY_PLACES;
     COUNT_MEDIUM(density_lookups, WAY_PLACES)
+    return so_far;
 }
 
-// Walks through the grid from `from` on, with what has `passed` so far; false where the quota has stopped it, at `from`.
-bool walk_through_grid(uvec4 key, float end, inout vec3 passed, inout float from) {
+// Walks through the grid from `from` on, with what has `passed` so far, whose steps are kept for rays that ask (`stores`); false where the quota has stopped it, at `from`.
+bool walk_through_grid(uvec4 key, float end, bool stores, inout vec3 passed, inout float from) {
     GridWalk walk = begin_grid_walk(beam.m, beam.origin, beam.direction, from, end);
     uint iterations = GRID_WALK_QUOTA;
     uint outcome = GRID_COLLIDED;
@@ -173,7 +176,9 @@ bool walk_through_grid(uvec4 key, float end, inout vec3 passed, inout float from
             ++walk.nulls;
             vec3 real = min(beam.m.sigma_t * (grid_density(beam.m, walk) / majorant), vec3(1.0));
             if (attenuate(real, beam.steps, vec2(unit_float(bits.y), unit_float(bits.z)), passed)) {
-                way_steps[beam.first_step + beam.steps] = vec4(passed, walk.entry + walk.t);
+                if (stores) {
+                    way_steps[beam.first_step + beam.steps] = vec4(passed, walk.entry + walk.t);
+                }
                 ++beam.steps;
             }
         }
@@ -221,18 +226,21 @@ bool begin_beam(uint slot, uint place, WalkState path, Hit hit, bool goes_on, ou
         beam.m = load_medium(beam.medium);
         asks = asks && beam.m.sigma_s != vec3(0.0);
     }
+    // Queries of surfaces want what is left of light from there. What a grid leaves of other light, the environment's too, is in the weight of the path's way (path_medium.comp).
+    bool has_surface = hit.triangle != NO_HIT && !crossing.boundary;
+    bool in_grid = HAS_GRIDS && beam.medium != NO_MEDIUM && beam.m.has_grid != 0u;
+    vec3 passed = vec3(1.0);
     bool asked_before = false;
     if (HAS_GRIDS) {
         // Of a ray that has just begun nothing has been asked for; of a way that path_medium.comp goes on with, its surface, too.
         float asked = beam.start > 0.0 ? beam_asked[slot] : 0.0;
         asked_before = asked >= beam.to;
         beam.from = max(beam.from, asked);
-        if (!asked_before && beam.medium != NO_MEDIUM && beam.m.has_grid != 0u) {
+        if (!asked_before && in_grid && (asks || has_surface)) {
             if (TABULATES) {
-                tabulate(beam.to);
+                passed = transmittance(beam.m.sigma_t, tabulate(beam.to, asks));
             } else {
                 float walked = beam.start;
-                vec3 passed = vec3(1.0);
                 uvec4 key = uvec4(walk_sequence(slot), walk_index(slot), BEAM_KEY + walk_round(slot), push.key.seed);
                 if (goes_on) {
                     BeamWay so_far = beam_ways[place];
@@ -241,7 +249,7 @@ bool begin_beam(uint slot, uint place, WalkState path, Hit hit, bool goes_on, ou
                     beam.steps = so_far.steps;
                     key.w ^= floatBitsToUint(walked);
                 }
-                walks = !walk_through_grid(key, beam.to, passed, walked);
+                walks = !walk_through_grid(key, beam.to, asks, passed, walked);
                 if (walks) {
                     beam_ways[place] = BeamWay(passed, beam.from, walked, beam.reach, beam.steps, 0.0, 0.0);
                     return false;
@@ -251,8 +259,8 @@ bool begin_beam(uint slot, uint place, WalkState path, Hit hit, bool goes_on, ou
         beam_asked[slot] = max(asked, beam.to);
     }
     vec3 surface = vec3(0.0);
-    if (hit.triangle != NO_HIT && !asked_before) {
-        surface = beam.medium != NO_MEDIUM ? passed_to(beam.to) : vec3(1.0);
+    if (has_surface && !asked_before) {
+        surface = in_grid || beam.medium == NO_MEDIUM ? passed : passed_to(beam.to);
         if (HAS_ABSORPTION && crossing.interior != OUTSIDE) {
             surface *= exp(-load_material(crossing.interior).absorption * (beam.to - beam.from));
         }

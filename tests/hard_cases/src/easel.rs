@@ -239,7 +239,7 @@ impl<'a> Easel<'a> {
 
     /// Whether pixels share the noise of a pass.
     pub fn shares_noise(&self) -> Result<bool> {
-        shares_noise(self.info, &self.settings)
+        shares_noise(self.info, &self.settings())
     }
 
     /// Whether its pictures have a bias.

@@ -295,3 +295,14 @@ fn no_module_has_more_descriptor_sets_than_every_device_binds() {
         }
     }
 }
+
+/// `maxPushConstantsSize` of every device.
+const PUSH_BYTES: u32 = 128;
+
+#[test]
+fn no_module_has_more_push_constants_than_every_device_takes() {
+    for shader in all() {
+        let bytes = shader.push_constant_bytes;
+        assert!(bytes <= PUSH_BYTES, "{}: {bytes} bytes", shader.name);
+    }
+}

@@ -68,6 +68,21 @@ fn cloud(around: bool) -> Scene {
     scene
 }
 
+/// The body with an absorbing thread in each column of its blocks, whose bounds are those of the threads: rays beside these take thousands of tentative collisions, of which none is one, and arrive.
+fn threads() -> Scene {
+    const CELLS: u32 = 8;
+    const BLOCK: f64 = 4.0;
+    let mut scene = fog_body(Phase::Isotropic);
+    scene.name = "threads".into();
+    scene.media[0].sigma_s = Vec3::splat(200.0);
+    scene.media[0].sigma_a = Vec3::splat(7800.0);
+    let in_thread = |p: f64| (p * f64::from(CELLS) % BLOCK - 1.5).abs() < 0.5;
+    let density = |p: DVec3| f32::from(u8::from(in_thread(p.x) && in_thread(p.y)));
+    let grid = DensityGrid::from_fn([CELLS; 3], density);
+    scene.media[0].density = Some(grid.in_box(DVec3::new(-0.2, -0.8, -0.7), DVec3::new(0.6, 0.2, 0.3)));
+    scene
+}
+
 fn several() -> VirtualLightSettings {
     VirtualLightSettings {
         samples_per_pass: 4,
@@ -261,6 +276,28 @@ fn pictures_of_media_do_not_depend_on_how_work_is_shared_out() {
                 assert_eq!(parted_counts, counts, "{what}");
             }
         }
+    });
+}
+
+/// Walks that stop in most stretches: were there more in a dispatch than a software driver runs, it would leave out light.
+#[test]
+fn long_walks_through_grids_do_not_depend_on_how_many_share_a_dispatch() {
+    with_gpu(|gpu| {
+        let scene = threads();
+        let of = |lights_at_once| {
+            let settings = VirtualLightSettings {
+                walks: 4,
+                lights_at_once,
+                ..settings()
+            };
+            let mut renderer = renderer(gpu, &scene, [9, 5], &settings);
+            (bits(&advance(&mut renderer, 1)), renderer.counts())
+        };
+        let (one, counts) = of(1);
+        assert!(counts.gather.shadow_rays > 0, "{counts:?}");
+        let (sixteen, counts_of_sixteen) = of(16);
+        assert_eq!(sixteen, one);
+        assert_eq!(counts_of_sixteen, counts);
     });
 }
 

@@ -5,12 +5,15 @@
 use super::volume::{coloured, lit_box, uneven};
 use super::*;
 use clerestory::gpu::shaders::constants::WAY_PLACES;
+use clerestory::gpu::{GpuOptions, Lesser};
+use clerestory::scene::{Environment, Medium};
 use clerestory::techniques::photon_mapping::volume::transmittance::VolumeTransmittance;
 use clerestory_hard_cases::scenes::{
     DensityProfile, PROFILE_FACES, PROFILE_SIGMA, density_profiles, floor_under, profile_grid,
 };
+use clerestory_tests::render::cuboid;
 use clerestory_tests::statistics::expect_mean_of;
-use clerestory_tests::with_gpu;
+use clerestory_tests::{assert_no_messages, gpu_with, with_gpu};
 use glam::DVec3;
 
 /// Rays of a pixel.
@@ -140,6 +143,82 @@ fn tables_are_kept_for_queries_that_a_quota_stops() {
             assert!((a - b).abs() <= 1e-5 * a, "{i}: {b}, not {a}");
         }
     });
+}
+
+/// Rays that scatter nowhere and meet no surface: none asks, none looks up a table, and the sky has what the grid leaves of it.
+#[test]
+fn the_sky_behind_a_grid_needs_no_table() {
+    with_gpu(|gpu| {
+        let even = DensityProfile {
+            name: "even",
+            values: vec![1.0],
+        };
+        let mut scene = Scene {
+            name: "sky behind a grid".into(),
+            environment: Some(Environment::uniform(Vec3::ONE)),
+            ..Scene::default()
+        };
+        scene.media.push(Medium {
+            sigma_a: Vec3::from_array(PROFILE_SIGMA),
+            density: Some(profile_grid(&even, 0.0)),
+            ..Medium::default()
+        });
+        let boundary = scene.add_material(Material {
+            name: "boundary".into(),
+            boundary: true,
+            interior: Some(0),
+            ..Material::default()
+        });
+        let [low, high] = PROFILE_FACES.map(|face| face as f32);
+        scene.place(cuboid(
+            "grid",
+            boundary,
+            Vec3::new(-1.0, low, -1.0),
+            Vec3::new(1.0, high, 1.0),
+        ));
+        scene.cameras.push(camera_down(0.3, 5.0));
+        let settings = PhotonSettings {
+            samples_per_pass: RAYS,
+            ..tabulated("all", 1 << 10)
+        };
+        let mut mapper = mapper(gpu, &scene, &settings);
+        let radiance = advance(&mut mapper, RAYS);
+        for (band, sigma) in PROFILE_SIGMA.into_iter().enumerate() {
+            let pixels: Vec<f64> = radiance.chunks(3).map(|pixel| f64::from(pixel[band])).collect();
+            let exact = (-f64::from(sigma) * (PROFILE_FACES[1] - PROFILE_FACES[0])).exp();
+            // Rays to the corners are 2 % longer.
+            expect_mean_of(&format!("{sigma}/m"), &pixels, exact, 0.0, 0.02 * exact);
+        }
+        // Those of the eye path's own walk.
+        let look_ups = mapper.eye_counters().density_lookups as f64 / f64::from(SIDE * SIDE * RAYS);
+        assert!(look_ups > 0.0 && look_ups < f64::from(WAY_PLACES) / 4.0, "{look_ups}");
+    });
+}
+
+/// Where memory lacks, fewer eye paths are under way at once, so that there is room for what is kept of their ways through a grid.
+#[test]
+fn waves_shrink_until_ways_through_grids_fit_beside_them() {
+    // Of the 74 MiB that the ways of a whole wave take, and what half a wave spares of them at least.
+    const LACKING: u64 = 1 << 25;
+    let of = |heap_bytes| {
+        let lesser = Lesser {
+            heap_bytes,
+            ..Lesser::default()
+        };
+        let gpu = gpu_with(&GpuOptions {
+            lesser,
+            ..GpuOptions::default()
+        });
+        let mut mapper = mapper(&gpu, &lit_box(uneven(coloured())), &tabulated("all", 1 << 10));
+        let used = gpu.memory_report().total();
+        let picture = bits(&advance(&mut mapper, 2));
+        assert_no_messages(&gpu);
+        (used, picture)
+    };
+    let (whole, picture) = of(None);
+    let (used, of_fewer) = of(Some(whole - LACKING));
+    assert_eq!(of_fewer, picture);
+    assert!(used + LACKING < whole, "{used} of {whole}");
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Probes that are cubes, beside octahedra: with half as many texels along a side they have one and a half times as many.
 
 use clerestory::Error;
+use clerestory::maps::impostor::ImpostorSettings;
 use clerestory::scene::Material;
 use clerestory::techniques::preview::{
-    LightProbe, LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, ProbeMap,
+    LightProbe, LightProbeDesc, LiveProbe, Preview, PreviewDesc, PreviewPart, ProbeMap, SearchedReflections,
 };
 use clerestory_tests::random::Random;
 use clerestory_tests::with_gpu;
@@ -163,6 +164,17 @@ fn maps_that_do_not_fit_are_refused() {
         let refused = LiveProbe::with_distances(gpu, on_device, &preview, small, false);
         let words = cause(refused.unwrap_err());
         assert!(words.contains("has no distances here"), "{words}");
+        // A search is for what an octahedron has shown.
+        let desc_of_cubes = PreviewDesc {
+            probes: Some(ProbeMap::Cube),
+            ..preview.desc()
+        };
+        let by_cubes = Preview::new(gpu, on_device, desc_of_cubes).unwrap();
+        let live = LiveProbe::with_distances(gpu, on_device, &preview, PROBE, false).unwrap();
+        let searched = SearchedReflections::new(gpu, on_device, live.probe(), &ImpostorSettings::default()).unwrap();
+        let refused = searched.record(&mut recorder, on_device, &by_cubes, &camera, 0..1, (&live, Vec3::ZERO));
+        let words = cause(refused.unwrap_err());
+        assert!(words.contains("lights by cubes"), "{words}");
         for (side, finest) in [(16, 16), (48, 16), (4096, 16), (64, 8), (64, 256)] {
             let map = ProbeMap::Cube;
             let refused = LightProbe::new(gpu, LightProbeDesc { map, side, finest });

@@ -162,7 +162,7 @@ impl Gather {
             bounces: [settings.least_bounces, settings.most().unwrap_or(u32::MAX)],
             edge_bound,
             selected,
-            pace: StoppedPace::new(gpu.caps().kind, lights_at_once),
+            pace: StoppedPace::new(gpu.caps().kind, lights_at_once, scene.profile().media.heterogeneous),
         })
     }
 
@@ -270,7 +270,7 @@ pub(super) fn lights_beside(gpu: &Gpu, scene: &GpuScene, wanted: u32, [once, mor
     loop {
         // The loop over lights itself, and what a connection takes beside its ray.
         let beside = 1 + searches(scene) + more;
-        let each = ((SOFTWARE_LOOP_CAP - once) / lights).saturating_sub(beside);
+        let each = (SOFTWARE_LOOP_CAP.saturating_sub(once) / lights).saturating_sub(beside);
         let lanes = if filters { gpu.caps().subgroup_size.max(1) } else { 1 };
         let quota = RAY_QUOTA.min(each / lanes);
         match scene.index_traversal().quota_within(gpu.caps(), quota, each, filters) {

@@ -5,11 +5,11 @@ use super::settings::VirtualLightSettings;
 use crate::Result;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{GRID_WALK_QUOTA, INSTANCE_SEARCH_STEPS, NO_MEDIUM};
+use crate::gpu::shaders::constants::{CONNECTION_GRID_QUOTA, GRID_WALK_QUOTA, INSTANCE_SEARCH_STEPS, NO_MEDIUM};
 use crate::gpu::shaders::sets::WaveSet;
 use crate::gpu::shaders::techniques::instant_radiosity::{vpl_gather, vpl_medium_gather};
 use crate::gpu::shaders::types::MediumGatherState;
-use crate::gpu::{BufferView, ComputePipeline, Gpu, Pass, PipelineInfo};
+use crate::gpu::{BufferView, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInfo, SOFTWARE_LOOP_CAP};
 use crate::techniques::PathTracerSettings;
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, PathSet, surface_spec};
@@ -22,6 +22,20 @@ const _: () =
 /// The kernel.
 pub(super) struct MediumGather {
     pipeline: ComputePipeline<vpl_medium_gather::Kernel>,
+}
+
+/// Lanes of the widest software devices.
+const LANES_MAX: u32 = 16;
+/// A connection has room beside the walk of its place.
+const _: () = assert!(
+    walk_iterations(LANES_MAX, GRID_WALK_QUOTA) + 2 * walk_iterations(LANES_MAX, CONNECTION_GRID_QUOTA)
+        < SOFTWARE_LOOP_CAP
+);
+
+/// Loop iterations that a quota lets a walk through a grid take, in a subgroup whose lanes take turns at worst in the loop over blocks, where each unit of the quota is one. The loop around it, over
+/// tentative collisions, is the same for all lanes. The pass that ends a loop counts too.
+const fn walk_iterations(lanes: u32, quota: u32) -> u32 {
+    (lanes + 1) * (quota + 1)
 }
 
 /// The places of a dispatch.
@@ -51,12 +65,17 @@ impl MediumGather {
         } else {
             0
         };
-        let grid = if profile.media.heterogeneous {
-            GRID_WALK_QUOTA
-        } else {
-            0
+        let lanes = match gpu.caps().kind {
+            DeviceKind::Cpu => gpu.caps().subgroup_size.max(1),
+            _ => 1,
         };
-        let beside = [grid, search + grid];
+        // The walk of the eye path's ray, and one of each shadow ray's stretches.
+        let [of_place, of_light] = if profile.media.heterogeneous {
+            [GRID_WALK_QUOTA, CONNECTION_GRID_QUOTA].map(|quota| walk_iterations(lanes, quota))
+        } else {
+            [0, 0]
+        };
+        let beside = [of_place, search + of_light];
         let (lights_at_once, index_quota) = lights_beside(gpu, scene, settings.lights_at_once, beside)?;
         let traversal = scene.index_traversal();
         let spec = surface_spec!(vpl_medium_gather, scene, {
@@ -158,6 +177,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "tests/tests/instant_radiosity/media.rs::light_off_mirrors_into_media_is_the_eye_paths",
         "tests/tests/instant_radiosity/media.rs::walks_through_media_are_counted",
         "tests/tests/instant_radiosity/media.rs::pictures_of_media_do_not_depend_on_how_work_is_shared_out",
+        "tests/tests/instant_radiosity/media.rs::long_walks_through_grids_do_not_depend_on_how_many_share_a_dispatch",
         "tests/tests/instant_radiosity/media.rs::threads_of_the_driver_never_show_in_media",
         "tests/tests/instant_radiosity/media.rs::what_media_have_no_lights_for_is_refused_by_name",
         "engine/src/techniques/instant_radiosity/settings.rs::eye_paths_in_media_also_have_what_mirrors_send_there",

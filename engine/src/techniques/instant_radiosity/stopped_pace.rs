@@ -7,6 +7,8 @@ use crate::gpu::{DeviceKind, Pace};
 
 /// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections.
 const PLACES_AT_ONCE: u32 = 1 << 12;
+/// Connections that one through a grid counts as on software devices, with its place's share of the walk that finds the collision again.
+const GRID_CONNECTIONS: u32 = 8;
 
 /// As many as a driver that watches has time for, by what the last one took.
 pub(super) struct StoppedPace {
@@ -19,11 +21,12 @@ pub(super) struct StoppedPace {
 }
 
 impl StoppedPace {
-    /// For places that take so many lights in a dispatch.
-    pub fn new(kind: DeviceKind, lights_at_once: u32) -> Self {
+    /// For places that take so many lights in a dispatch, in a scene with or without grids.
+    pub fn new(kind: DeviceKind, lights_at_once: u32, has_grids: bool) -> Self {
+        let connections = SOFTWARE_CONNECTIONS / if has_grids { GRID_CONNECTIONS } else { 1 };
         Self {
             pace: Pace::new(kind, u32::MAX / PLACES_AT_ONCE),
-            unwatched: SOFTWARE_CONNECTIONS / (lights_at_once * PLACES_AT_ONCE),
+            unwatched: connections / (lights_at_once * PLACES_AT_ONCE),
             recorded: Cell::new(0),
         }
     }
@@ -53,7 +56,7 @@ mod tests {
 
     #[test]
     fn places_that_go_on_are_as_many_as_a_driver_has_time_for() {
-        let mut pace = StoppedPace::new(DeviceKind::Discrete, 64);
+        let mut pace = StoppedPace::new(DeviceKind::Discrete, 64, false);
         assert_eq!(pace.places(), PLACES_AT_ONCE);
         // A submission of other stages says nothing of the pace of this one.
         pace.submitted(1.0);
@@ -68,7 +71,10 @@ mod tests {
         assert_eq!(after(250 * PLACES_AT_ONCE, 1.0), 62 * PLACES_AT_ONCE);
         // Seconds for the least there is: no less is to be had.
         assert_eq!(after(PLACES_AT_ONCE, 3.0), PLACES_AT_ONCE);
-        let software = |lights| StoppedPace::new(DeviceKind::Cpu, lights).places();
-        assert_eq!([64, 1].map(software), [1 << 13, 1 << 19]);
+        let software =
+            |has_grids| [64, 16, 1].map(|lights| StoppedPace::new(DeviceKind::Cpu, lights, has_grids).places());
+        assert_eq!(software(false), [1 << 13, 1 << 15, 1 << 19]);
+        // Less than the least there is, for 64 lights.
+        assert_eq!(software(true), [1 << 12, 1 << 12, 1 << 16]);
     }
 }

@@ -179,7 +179,8 @@ impl PathTracer {
     }
 
     /// As [`PathTracer::new`], for pictures in which so many photons of a pass share what paths scatter behind their first scattering in a medium
-    /// ([`photon_share`](crate::transport::photon_share)), but its direct light: paths have what these leave. 0: all that their path set has. Waves are whole.
+    /// ([`photon_share`](crate::transport::photon_share)), but its direct light: paths have what these leave. 0: all that their path set has. Waves are whole, and an
+    /// [`ArrivalStage`] has `stage_bytes` of memory by place as with [`PathTracer::beyond`].
     pub(crate) fn beside_photons(
         gpu: &Gpu,
         scene: Arc<GpuScene>,
@@ -187,6 +188,7 @@ impl PathTracer {
         size: [u32; 2],
         settings: PathTracerSettings,
         photons: u32,
+        stage_bytes: u64,
     ) -> Result<Self> {
         debug_assert!(
             photons == 0 || !settings.keeps_waves_full(),
@@ -196,7 +198,7 @@ impl PathTracer {
             photons,
             ..SharedLight::default()
         };
-        Self::beside(gpu, scene, camera, size, settings, shared_light, 0)
+        Self::beside(gpu, scene, camera, size, settings, shared_light, stage_bytes)
     }
 
     fn beside(

@@ -81,14 +81,24 @@ pub(super) struct EventsAsked<'a> {
 type Counters = photon_gather::GatherCounters;
 
 impl Gather {
-    /// For eye paths of the set `eye`, up to `slots` at once, which ask for photons of some classes where the path set is an expression.
+    /// Bytes that it keeps of an eye path.
+    pub fn slot_bytes(scene: &GpuScene) -> u64 {
+        if scene.profile().media.any() {
+            Beam::slot_bytes(scene)
+        } else {
+            0
+        }
+    }
+
+    /// For eye paths of the set `eye`, up to `slots` at once, which ask for photons of some classes where the path set is an expression; `kept` has
+    /// [`slot_bytes`](Self::slot_bytes) for each.
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
         settings: &PhotonSettings,
         eye: &PathSet,
         classes: Option<&PathClasses>,
-        slots: u32,
+        (slots, kept): (u32, Buffer),
     ) -> Result<Self> {
         let set = &settings.path_set;
         // Photons have been scattered once before they land, and at the point that gathers them.
@@ -162,7 +172,7 @@ impl Gather {
             floor,
         };
         let beam = has_media
-            .then(|| Beam::new(gpu, scene, settings, asking, &queues, slots))
+            .then(|| Beam::new(gpu, scene, settings, asking, &queues, (slots, kept)))
             .transpose()?;
         let bytes = size_of::<Counters>() as u64;
         let counters = gpu.buffer(&BufferDesc::storage("gather counters", bytes, Category::Work))?;

@@ -196,13 +196,15 @@ impl PhotonMapper {
             PhotonTracer::in_media(gpu, Arc::clone(&scene), plan, append, classes.as_ref(), stored)
         });
         let tracer = tracer.transpose()?;
-        // Takes as much memory as is left, if it must.
-        let photons_beside = if shares { settings.photons } else { 0 };
-        let eye = PathTracer::beside_photons(gpu, Arc::clone(&scene), camera, size, eye_settings, photons_beside)?;
+        // Takes as much memory as is left, if it must, with what gathering keeps.
+        let kept = if has_map { Gather::slot_bytes(&scene) } else { 0 };
+        let beside = if shares { settings.photons } else { 0 };
+        let eye = PathTracer::beside_photons(gpu, Arc::clone(&scene), camera, size, eye_settings, beside, kept)?;
+        let memory = (eye.slots(), eye.stage_memory());
         let photons = match tracer {
             Some(tracer) => Some(Photons {
                 tracer,
-                gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), eye.slots())?,
+                gather: Gather::new(gpu, &scene, &settings, &eye_paths, classes.as_ref(), memory)?,
                 maker: has_surface_map
                     .then(|| MapMaker::new(gpu, settings.map_build))
                     .transpose()?,

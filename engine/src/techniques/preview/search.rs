@@ -15,6 +15,7 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::live::LiveProbe;
+use super::probe::ProbeMap;
 use super::shade::{Eye, PreviewPart, Seen, Target, frame};
 use super::{LightProbe, Preview};
 use crate::gpu::ash::vk;
@@ -74,7 +75,7 @@ impl SearchedReflections {
     /// [`PreviewPart`], mirror what a search in its distances finds; from others it would take away light that was never added. `place` is where the probe was drawn, metres.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a camera that cannot be used, a place that is not finite, a probe without distances ([`LiveProbe::with_distances`]), a preview without probes ([`PreviewDesc::probes`](super::PreviewDesc::probes)), and a scene with other features than those that it was made for;
+    /// [`Error::Setting`] for a camera that cannot be used, a place that is not finite, a probe without distances ([`LiveProbe::with_distances`]), a preview without probes or with cubes ([`PreviewDesc::probes`](super::PreviewDesc::probes)), and a scene with other features than those that it was made for;
     /// [`Error::MissingBarrier`] in debug builds.
     pub fn record(
         &self,
@@ -92,9 +93,16 @@ impl SearchedReflections {
             let cause = "has other features than that which the search was made for";
             return Err(Error::setting("scene or probe", "given", cause));
         }
-        if preview.desc().probes.is_none() {
-            let cause =
-                "lights nothing by probes, and a search is for what they have shown; PreviewDesc::probes is needed";
+        let unlit = match preview.desc().probes {
+            Some(ProbeMap::Octahedron) => None,
+            Some(ProbeMap::Cube) => Some(
+                "lights by cubes, and a search is for what an octahedron has shown; PreviewDesc::probes says which",
+            ),
+            None => Some(
+                "lights nothing by probes, and a search is for what they have shown; PreviewDesc::probes is needed",
+            ),
+        };
+        if let Some(cause) = unlit {
             return Err(Error::setting("preview", "given", cause));
         }
         let (seen_from, around) = (&preview.drawing.gbuffer, live.gbuffer());

@@ -36,8 +36,17 @@ use crate::{Error, Result};
 const BEAM_QUOTA: u32 = 32_768;
 /// The same where the kernel has found the ray's hit before, whose lanes may take turns as those of walks do; the stages ask for the rest.
 const FUSED_QUOTA: u32 = 12_288;
-/// Bytes of the steps of a walk through a grid, or of its table.
-const STEPS_BYTES: usize = WAY_STEPS as usize * size_of::<[f32; 4]>();
+/// Bytes of a way, of how far a slot has asked, and of the steps of a walk through a grid, or of its table.
+const WAY_BYTES: u64 = size_of::<BeamWay>() as u64;
+const ASKED_BYTES: u64 = size_of::<f32>() as u64;
+const STEPS_BYTES: u64 = WAY_STEPS as u64 * size_of::<[f32; 4]>() as u64;
+/// Alignment of what is bound that every device takes.
+const BINDING_BYTES: u64 = 256;
+/// Waves are of whole workgroups.
+const _: () = assert!(
+    (WAY_BYTES * WALK_GROUP as u64).is_multiple_of(BINDING_BYTES)
+        && (ASKED_BYTES * WALK_GROUP as u64).is_multiple_of(BINDING_BYTES)
+);
 
 type Counters = photon_beam::BeamCounters;
 
@@ -58,10 +67,7 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     way_finder: Option<ComputePipeline<photon_beam_ways::Kernel>>,
     /// For places that a quota stopped: made when it is first needed.
     linear: (Box<photon_beam::Spec>, OnceLock<ComputePipeline<photon_beam::Kernel>>),
-    ways: Buffer,
-    asked: Buffer,
-    /// Of ways through grids, what is left of light along them.
-    steps: Buffer,
+    kept: KeptWays,
     /// Only where the map has planes.
     planes: Option<PlaneRays>,
     counters: Buffer,
@@ -74,6 +80,36 @@ pub(in crate::techniques::photon_mapping) struct Beam {
     photons: u32,
     /// [`PathClasses::asks`].
     classes: [u32; ASKING_STATES],
+}
+
+/// What is kept of the ways of a wave, by place or slot, one behind the other.
+struct KeptWays {
+    memory: Buffer,
+    slots: u64,
+    has_grids: bool,
+}
+
+impl KeptWays {
+    fn ways(&self) -> BufferView<'_> {
+        self.memory.slice(0, WAY_BYTES * self.slots)
+    }
+
+    /// How far slots have asked; some other memory where there are no grids.
+    fn asked(&self) -> BufferView<'_> {
+        if !self.has_grids {
+            return self.ways();
+        }
+        self.memory.slice(WAY_BYTES * self.slots, ASKED_BYTES * self.slots)
+    }
+
+    /// What is left of light along ways; some other memory where there are no grids.
+    fn steps(&self) -> BufferView<'_> {
+        if !self.has_grids {
+            return self.ways();
+        }
+        let first = (WAY_BYTES + ASKED_BYTES) * self.slots;
+        self.memory.slice(first, STEPS_BYTES * self.slots)
+    }
 }
 
 /// Queries of one map, to be recorded with a wave.
@@ -103,7 +139,16 @@ pub(in crate::techniques::photon_mapping) struct BeamAsk<'a> {
 }
 
 impl Beam {
-    /// For up to `slots` eye paths at once, with a queue in the memory `queues`.
+    /// Bytes that are kept of the way of an eye path.
+    pub fn slot_bytes(scene: &GpuScene) -> u64 {
+        if scene.profile().media.heterogeneous {
+            WAY_BYTES + ASKED_BYTES + STEPS_BYTES
+        } else {
+            WAY_BYTES
+        }
+    }
+
+    /// For up to `slots` eye paths at once, whole workgroups of them, with [`slot_bytes`](Self::slot_bytes) of `memory` for each and a queue in the memory `queues`.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`], [`Error::Setting`] for fused stages over a kd-tree, and as [`ray_quota`].
@@ -113,7 +158,7 @@ impl Beam {
         settings: &PhotonSettings,
         asking: BeamAsk<'_>,
         queues: &QueueMemory,
-        slots: u32,
+        (slots, memory): (u32, Buffer),
     ) -> Result<Self> {
         let BeamAsk {
             eye,
@@ -195,14 +240,6 @@ impl Beam {
             has_classes: classes.is_some(),
             ..Default::default()
         };
-        let in_grids = if profile.media.heterogeneous { slots } else { 1 };
-        let work = |name: &str, bytes: usize, count: u32| {
-            gpu.buffer(&BufferDesc::storage(
-                name,
-                bytes as u64 * u64::from(count),
-                Category::Work,
-            ))
-        };
         let bytes = size_of::<Counters>() as u64;
         let volume_states = match classes {
             Some(classes) => classes.asking()[1],
@@ -219,15 +256,17 @@ impl Beam {
                 .transpose()?,
             queue,
             linear: (Box::new(spec!(photon_beam, QUEUE_SLOTS, true)), OnceLock::new()),
-            ways: work("beam ways", size_of::<BeamWay>(), slots)?,
-            asked: work("beam asked", size_of::<f32>(), in_grids)?,
-            steps: work("beam steps", STEPS_BYTES, in_grids)?,
+            kept: KeptWays {
+                memory,
+                slots: slots.into(),
+                has_grids: profile.media.heterogeneous,
+            },
             planes: settings
                 .volume
                 .stores_planes()
                 .then(|| PlaneRays::new(gpu, scene, slots))
                 .transpose()?,
-            counters: work("beam counters", bytes as usize, 1)?,
+            counters: gpu.buffer(&BufferDesc::storage("beam counters", bytes, Category::Work))?,
             counters_readback: gpu.buffer(&BufferDesc::readback("beam counters", bytes))?,
             states: surface_states | volume_states,
             volume_states,
@@ -254,7 +293,7 @@ impl Beam {
 
     /// What is left of light from the surfaces that paths have met, by place.
     pub fn ways(&self) -> BufferView<'_> {
-        self.ways.view()
+        self.kept.ways()
     }
 
     /// Counts of the last wave: ways that asked, events that they met, and rays towards planes.
@@ -284,6 +323,7 @@ impl BeamStage<'_> {
         let Beam {
             queue,
             counters,
+            kept,
             planes,
             ..
         } = self.beam;
@@ -293,9 +333,9 @@ impl BeamStage<'_> {
             event_records: &self.map.events,
             photon_event_root: self.map.root.view(),
             beam_counters: counters.view(),
-            photon_beam_ways: self.beam.ways.view(),
-            photon_beam_asked: self.beam.asked.view(),
-            photon_way_steps: self.beam.steps.view(),
+            photon_beam_ways: kept.ways(),
+            photon_beam_asked: kept.asked(),
+            photon_way_steps: kept.steps(),
             photon_plane_rays: planes.as_ref().map_or(counters.view(), PlaneRays::rays),
             gather_head: queue.gather_head,
             beam_places: queue.gather_places,
@@ -439,9 +479,9 @@ impl BeamStage<'_> {
     }
 }
 
-/// Eye paths under way at once, at most, so that what rays through grids keep can be bound; 0 leaves their number as it is.
+/// Eye paths under way at once, at most, so that one buffer has what rays through grids keep; 0 leaves their number as it is.
 pub(in crate::techniques::photon_mapping) fn paths_in_flight(gpu: &Gpu, scene: &GpuScene) -> u32 {
-    let most = gpu.caps().max_storage_buffer_range / STEPS_BYTES as u64;
+    let most = gpu.caps().max_storage_buffer_range / Beam::slot_bytes(scene);
     if !scene.profile().media.heterogeneous || most >= u64::from(default_slots(gpu)) {
         return 0;
     }
