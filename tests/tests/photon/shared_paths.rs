@@ -46,7 +46,7 @@ fn lamps_that_eye_paths_meet_are_shared() {
         let fog = medium(2.0, 0.8, Phase::Isotropic);
         for (scene, set) in [
             (box_by_a_lamp(fog.clone()), "bounces=2..3"),
-            (box_by_a_lamp(fog.clone()), "LV+E"),
+            (box_by_a_lamp(fog.clone()), "LV[DV]*E"),
             (behind_a_pane(fog), "L.*V.*E"),
         ] {
             let settings = PhotonSettings {

@@ -84,7 +84,7 @@ fn photons_are_kept_to_the_count_whatever_becomes_of_them() {
         for asked in [
             // Ended after the second collision, or once no light path that is asked for goes on.
             settings("bounces=0..2"),
-            settings("LVVE"),
+            settings("LV[DV]E"),
             PhotonSettings {
                 direct_photons: true,
                 ..settings("all")
