@@ -131,7 +131,12 @@ fn virtual_lights_take_the_cases_of_materials_as_documented() {
 
 #[test]
 fn virtual_lights_take_the_other_cases_as_documented() {
-    check_some_alone("vpl", |case| !OF_MATERIALS.contains(&case.name));
+    check_some_alone("vpl", |case| !OF_MATERIALS.contains(&case.name) && !case.of_media);
+}
+
+#[test]
+fn virtual_lights_take_the_cases_of_media_as_documented() {
+    check_some_alone("vpl", |case| case.of_media);
 }
 
 #[test]

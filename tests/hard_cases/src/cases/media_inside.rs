@@ -37,7 +37,7 @@ const BEFORE: f64 = 3.0;
 /// Radiance of light that was scattered twice or more, of a lamp of 1 W in fog of a free path of 1 m: as the tests of the path tracer have it (`tests/tests/media`).
 const MULTIPLE: f64 = 4.22674e-4;
 /// What blur about a lamp may cost techniques with kernels.
-const BLURRED: f64 = 0.05;
+const BLURRED: f64 = 0.1;
 
 /// A lamp of 1 W, and one ray past it.
 fn past_a_lamp() -> Scene {
