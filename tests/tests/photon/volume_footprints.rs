@@ -132,7 +132,7 @@ fn glass() -> Material {
 }
 
 /// Fails unless collisions behind the layers have the radius that their volume asks for; `bends`: unlike that of a way without glass.
-fn expect(gpu: &Gpu, scene: &Scene, settings: PhotonSettings, bounce: Option<u32>, layers: &[Layer], bends: bool) {
+fn expect(gpu: &Gpu, scene: &Scene, settings: PhotonSettings, bounce: u32, layers: &[Layer], bends: bool) {
     let settings = PhotonSettings {
         volume_kernel: VolumeKernel::Footprint,
         volume_dampening: 0.0,
@@ -146,7 +146,7 @@ fn expect(gpu: &Gpu, scene: &Scene, settings: PhotonSettings, bounce: Option<u32
     let events = mapper.events(0).unwrap_or_else(|error| panic!("{error}"));
     let is_there = |e: &PhotonEvent| {
         let height = f64::from(e.position.z);
-        bounce.is_none_or(|bounce| e.bounce == bounce) && height > behind.upper && height < last.upper
+        e.bounce == bounce && height > behind.upper && height < last.upper
     };
     let (mut worst, mut count, mut told) = (0.0f64, 0, 0);
     for event in events.iter().map(|e| e.event).filter(is_there) {
@@ -181,13 +181,13 @@ fn kernels_in_nested_bodies_are_those_of_all_that_photons_have_passed() {
         place_fog(&mut scene, 0.3, HALF + 2.0, [-2.0, 4.0]);
         place_fog(&mut scene, 1.5, HALF + 1.0, [-1.0, 0.6]);
         let layers = [layer(0.6, 1.0, 1.5), layer(4.0, 1.0, 0.3)];
-        expect(gpu, &scene, direct(PHOTONS), Some(0), &layers, false);
+        expect(gpu, &scene, direct(PHOTONS), 0, &layers, false);
         // Three of them, with a gap of nothing.
         let mut scene = layered("bodies one behind the other");
         place_fog(&mut scene, 2.0, HALF + 1.0, [-1.0, 0.4]);
         place_fog(&mut scene, 0.5, HALF + 1.0, [0.8, 4.0]);
         let layers = [layer(0.4, 1.0, 2.0), layer(0.8, 1.0, 0.0), layer(4.0, 1.0, 0.5)];
-        expect(gpu, &scene, direct(PHOTONS), Some(0), &layers, false);
+        expect(gpu, &scene, direct(PHOTONS), 0, &layers, false);
     });
 }
 
@@ -203,7 +203,7 @@ fn kernels_behind_glass_are_those_of_refracted_footprints() {
             layer(1.3, 1.0, 0.0),
             layer(4.0, 1.0, 0.7),
         ];
-        expect(gpu, &scene, direct(PHOTONS), Some(2), &layers, true);
+        expect(gpu, &scene, direct(PHOTONS), 2, &layers, true);
 
         let mut scene = layered("within glass");
         let filled = Material {
@@ -213,17 +213,6 @@ fn kernels_behind_glass_are_those_of_refracted_footprints() {
         scene.media.push(medium(0.7, 0.8, Phase::Isotropic));
         place(&mut scene, filled, HALF + 2.0, [0.5, 4.0]);
         let layers = [layer(0.5, 1.0, 0.0), layer(4.0, IOR, 0.7)];
-        expect(gpu, &scene, direct(PHOTONS), Some(1), &layers, true);
-
-        // A pane in the fog, and light that meets nothing but it.
-        let mut scene = layered("a pane in fog");
-        place_fog(&mut scene, 0.4, HALF + 3.0, [-1.0, 4.0]);
-        place(&mut scene, glass(), HALF + 2.0, [0.5, 1.0]);
-        let layers = [layer(0.5, 1.0, 0.4), layer(1.0, IOR, 0.0), layer(4.0, 1.0, 0.4)];
-        let specular = PhotonSettings {
-            photons: PHOTONS,
-            ..settings("LSSVE")
-        };
-        expect(gpu, &scene, specular, None, &layers, true);
+        expect(gpu, &scene, direct(PHOTONS), 1, &layers, true);
     });
 }
