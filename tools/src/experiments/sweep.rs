@@ -57,7 +57,7 @@ use serde_json::{Map, Value};
 /// Pixels of either side at most.
 const SIDE_MAX: u32 = 16_384;
 /// Repeats at most.
-const REPEATS_MAX: u32 = 99;
+const REPEATS_MAX: u32 = 999;
 /// Samples a pixel at most; also what a picture with a time budget asks for.
 pub const SPP_MAX: u32 = 1 << 24;
 /// Height and width of smoke pictures, unless the file says otherwise.
@@ -282,7 +282,7 @@ impl Sweep {
             return Err(wrong("spp", shown, "needs rising budgets above 0"));
         }
         if !(1..=REPEATS_MAX).contains(&self.repeats) {
-            return Err(wrong("repeats", self.repeats, "is not in 1 … 99"));
+            return Err(wrong("repeats", self.repeats, "is not in 1 … 999"));
         }
         if !(2..=SPP_MAX).contains(&self.reference.spp) {
             return Err(wrong("reference.spp", self.reference.spp, "is not in 2 … 16777216"));
