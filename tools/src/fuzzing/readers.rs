@@ -117,6 +117,8 @@ const OF_SIDECARS: &[&str] = &[
     "[environment]\n",
     "[[cameras]]\n",
     "[metals]\n",
+    "reflectance = [0.9, 0.7, 1]",
+    "edge_tint = [1, 0.6, 0]",
     "[phong]\n",
     "material = \"red\"\n",
     "boundary = true\n",

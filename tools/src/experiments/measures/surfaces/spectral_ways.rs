@@ -88,7 +88,7 @@ impl Way {
         let channels = spectrum.channels();
         let (conductor, form) = match self {
             Self::Channels(form) => (channels, form),
-            Self::Colors => (by_two_colors(&channels), FresnelForm::Simplified),
+            Self::Colors => (by_two_colors(&channels)?, FresnelForm::Simplified),
             Self::Wavelengths => (spectrum.at_wavelengths(WAVELENGTHS), FresnelForm::Exact),
             Self::Table | Self::Bins(_) => (channels, FresnelForm::Exact),
         };
@@ -136,7 +136,10 @@ pub fn spectrum_of(metal: &str) -> Result<IndexSpectrum> {
 }
 
 /// The index that an artist would have described by two colours, which hold no more than single precision.
-fn by_two_colors(ior: &ConductorIor) -> ConductorIor {
+///
+/// # Errors
+/// As [`by_colors`]; an index has both colours in range.
+fn by_two_colors(ior: &ConductorIor) -> Result<ConductorIor> {
     let [reflectance, edge_tint] =
         artistic_parameters(ior.eta.as_dvec3(), ior.k.as_dvec3()).map(|color| color.as_vec3());
     by_colors(reflectance, edge_tint)
@@ -210,7 +213,7 @@ mod tests {
         assert!(columns.iter().any(|column| off(column) > 1e-5));
         // The half pipe is the same on both sides.
         assert!((columns[3] - columns[60]).abs().max_element() < 1e-12);
-        let [before, after] = [ior, by_two_colors(&ior)].map(|ior| [ior.eta, ior.k]);
+        let [before, after] = [ior, by_two_colors(&ior).expect("colours")].map(|ior| [ior.eta, ior.k]);
         for (a, b) in before.iter().zip(&after) {
             assert!((*a - *b).abs().max_element() < 1e-3, "{a} {b}");
         }
