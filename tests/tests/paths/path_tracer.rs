@@ -628,6 +628,51 @@ fn metals_by_two_colours_show_their_reflectance_and_are_exact() {
     });
 }
 
+/// Two metals by tables, and one whose index is that of the first, side by side: each shows its own factor, and an exact metal between them what it shows without
+/// tables in the scene.
+#[test]
+fn metals_by_tables_have_each_their_own() {
+    with_gpu(|gpu| {
+        let named = |name: &str| metals::by_name(name).expect("metal");
+        let cosine = 0.4f64;
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let shown = |fresnel: FresnelForm, seen: usize| {
+            let mut scene = Scene::default();
+            let kinds = [
+                ("silver", fresnel),
+                ("copper", FresnelForm::Exact),
+                ("gold", fresnel),
+                ("silver", fresnel),
+            ];
+            for (place, (name, fresnel)) in (0u8..).zip(kinds) {
+                let material = scene.add_material(Material {
+                    conductor: Some(named(name)),
+                    fresnel,
+                    ..Material::mirror(name, Vec3::ONE)
+                });
+                let mut plate = floor(name, material, 1.0, 0.0);
+                for corner in &mut plate.positions {
+                    corner.z += 2.0 * f32::from(place);
+                }
+                scene.place(plate);
+            }
+            scene.environment = Some(Environment::uniform(Vec3::ONE));
+            let middle = DVec3::Z * (2.0 * seen as f64);
+            let eye = middle + 10.0 * DVec3::new(sine, cosine, 0.0);
+            scene.cameras.push(orthographic(eye, middle, DVec3::Z, 0.2));
+            (kinds[seen], render(gpu, &scene, SMALL, 4, &independent()))
+        };
+        for seen in 0..4 {
+            let ((name, fresnel), picture) = shown(FresnelForm::Table, seen);
+            let ior = named(name);
+            let factor = MetalFresnel::new(fresnel, ior.eta.as_dvec3(), ior.k.as_dvec3());
+            picture.expect_uniform(name, factor.at(cosine).to_array(), 1e-5);
+        }
+        let [beside, alone] = [FresnelForm::Table, FresnelForm::Exact].map(|fresnel| shown(fresnel, 1).1);
+        assert_eq!(beside.bits(), alone.bits());
+    });
+}
+
 #[test]
 fn path_sets_are_a_partition() {
     with_gpu(|gpu| {

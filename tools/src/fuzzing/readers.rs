@@ -119,6 +119,7 @@ const OF_SIDECARS: &[&str] = &[
     "[metals]\n",
     "reflectance = [0.9, 0.7, 1]",
     "edge_tint = [1, 0.6, 0]",
+    "fresnel = \"table\"",
     "[phong]\n",
     "material = \"red\"\n",
     "boundary = true\n",

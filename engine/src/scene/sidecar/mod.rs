@@ -14,7 +14,7 @@
 //! [metals]                      # by material name
 //! ring = "gold"                 # gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt
 //! bowl = { eta = [1.4, 0.9, 0.7], k = [7.6, 6.4, 5.6] }
-//! vase = { metal = "gold", fresnel = "compensated" }  # exact, schlick, rescaled, compensated, f82-tint, hoffman, simplified
+//! vase = { metal = "gold", fresnel = "compensated" }  # exact, schlick, rescaled, compensated, f82-tint, hoffman, simplified, table
 //! cup = { reflectance = [0.9, 0.7, 0.4], edge_tint = [0.8, 0.6, 0.5] }  # at normal incidence, up to 0.9999, and near grazing incidence; 0 to 1
 //! coin = { spectrum = "coin.csv" }                    # lines of a wavelength in nanometres, n, k
 //! pan = { metal = "copper", distribution = "beckmann", geometry = "cook-torrance" }  # ggx, beckmann, cosine-lobe; cook-torrance, simplified, smith
@@ -100,8 +100,8 @@ struct EnvironmentTable {
 #[serde(
     untagged,
     expecting = "a metal's name, or a table with metal, spectrum, eta and k, or reflectance and edge_tint, and if wanted fresnel: exact, \
-                 schlick, rescaled, compensated, f82-tint, hoffman or simplified; distribution: ggx, beckmann or cosine-lobe; geometry: \
-                 cook-torrance, simplified or smith"
+                 schlick, rescaled, compensated, f82-tint, hoffman, simplified or table; distribution: ggx, beckmann or cosine-lobe; \
+                 geometry: cook-torrance, simplified or smith"
 )]
 enum Metal {
     Named(String),

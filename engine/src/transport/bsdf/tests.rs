@@ -276,6 +276,7 @@ fn metals_reflect_by_the_form_they_name() {
             features.compensated_conductor,
             features.tinted_conductor,
             features.simplified_conductor,
+            features.table_conductor,
         ];
         assert_eq!(compiled.iter().filter(|on| **on).count(), 1, "{form}: {compiled:?}");
         assert_eq!(features.exact_conductor, form == FresnelForm::Exact);
