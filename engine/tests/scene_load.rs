@@ -173,7 +173,6 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
         ("{ eta = [1, 1, 1], k = [1e10, 1, 1] }", "k from 0 to a million"),
         ("{ eta = [1, 1, 1], k = [1, 1, -0.1] }", "k from 0 to a million"),
         ("{ eta = [1, 1, 1], k = [1, nan, 1] }", "k from 0 to a million"),
-        ("{ reflectance = [1, 1, 2], edge_tint = [0, 0, 0] }", "from 0 to 1"),
         ("{ spectrum = \"nowhere.csv\" }", "metals.ring.spectrum"),
         ("{ spectrum = \"m.obj\" }", "line 1"),
     ] {
@@ -213,6 +212,105 @@ fn metals_are_named_measured_or_coloured_and_name_their_form() {
     scene.materials[0].fresnel = FresnelForm::Compensated;
     let message = scene.check().expect_err("no conductor").to_string();
     assert!(message.contains("compensated needs a conductor"), "{message}");
+}
+
+/// A metal by its reflectance at normal incidence and its edge tint: the index that a scene holds gives both colours back, in every form of the factor.
+#[test]
+fn two_colours_of_a_metal_are_kept_or_refused() {
+    use clerestory::scene::FresnelForm;
+    use clerestory::scene::metals::artistic::{artistic_index, artistic_parameters};
+    let load_metal = |text: &str| {
+        let folder = folder(&format!("[metals]\nring = {text}\n"));
+        load(folder.path(), "m.obj").expect(text)
+    };
+    let (reflectance, edge_tint) = (Vec3::new(0.9, 0.5, 0.04), Vec3::new(1.0, 0.5, 0.0));
+    let colors = "reflectance = [0.9, 0.5, 0.04], edge_tint = [1.0, 0.5, 0.0]";
+    let named = FresnelForm::ALL.map(|form| (form, format!(", fresnel = \"{form}\"")));
+    for (form, fresnel) in named.into_iter().chain([(FresnelForm::Exact, String::new())]) {
+        let scene = load_metal(&format!("{{ {colors}{fresnel} }}"));
+        let ring = &scene.materials[0];
+        assert_eq!((ring.fresnel, ring.metallic), (form, 1.0));
+        assert!(scene.notes.iter().all(|note| !note.feature.contains("reflectance")));
+        let ior = ring.conductor.expect("conductor");
+        let [eta, k] = artistic_index(reflectance.as_dvec3(), edge_tint.as_dvec3()).map(|part| part.as_vec3());
+        assert_eq!((ior.eta, ior.k), (eta, k), "{form}");
+        let kept = artistic_parameters(ior.eta.as_dvec3(), ior.k.as_dvec3());
+        for (kept, given) in kept.into_iter().zip([reflectance, edge_tint]) {
+            assert!(
+                (kept - given.as_dvec3()).abs().max_element() < 1e-6,
+                "{form}: {kept} {given}"
+            );
+        }
+    }
+    // Whole numbers are numbers, and the ends are in range; what no index reflects is cut off with a note.
+    let scene = load_metal("{ reflectance = [1, 0, 1], edge_tint = [0, 1, 1] }");
+    scene.check().expect("sound");
+    let note = scene
+        .notes
+        .iter()
+        .find(|note| note.feature == "reflectance above 0.9999");
+    assert_eq!(note.expect("note").at, "metals.ring");
+    for (text, words) in [
+        (
+            "{ reflectance = [1, 1, 2], edge_tint = [0, 0, 0] }",
+            "\"metals.ring.reflectance\": 2 in blue",
+        ),
+        (
+            "{ reflectance = [-0.1, 1, 1], edge_tint = [0, 0, 0] }",
+            "\"metals.ring.reflectance\": -0.1 in red",
+        ),
+        (
+            "{ reflectance = [1, nan, 1], edge_tint = [0, 0, 0] }",
+            "\"metals.ring.reflectance\": NaN in green",
+        ),
+        (
+            "{ reflectance = [1, -inf, 1], edge_tint = [0, 0, 0] }",
+            "\"metals.ring.reflectance\": -inf in green",
+        ),
+        (
+            "{ reflectance = [1, 1, 1], edge_tint = [0, 1.5, 0] }",
+            "\"metals.ring.edge_tint\": 1.5 in green",
+        ),
+        (
+            "{ reflectance = [1, 1, 1], edge_tint = [nan, 0, 0] }",
+            "\"metals.ring.edge_tint\": NaN in red",
+        ),
+        (
+            "{ reflectance = [1, 1, 1], edge_tint = [0, 0, inf] }",
+            "\"metals.ring.edge_tint\": inf in blue",
+        ),
+        (
+            "{ reflectance = [1, 1, 1], edge_tint = [0, 0, 1e39] }",
+            "\"metals.ring.edge_tint\": inf in blue",
+        ),
+        ("{ reflectance = [1, 1, 1] }", "needs one of"),
+        ("{ edge_tint = [1, 1, 1] }", "needs one of"),
+        (
+            "{ reflectance = [1, 1, 1], edge_tint = [0, 0, 0], metal = \"gold\" }",
+            "needs one of",
+        ),
+        ("{ reflectance = [1, 1, 1], k = [1, 1, 1] }", "needs one of"),
+        // What is no table of the known keys has the line and what was expected.
+        (
+            "{ reflectance = [1, 1], edge_tint = [0, 0, 0] }",
+            "reflectance and edge_tint",
+        ),
+        (
+            "{ reflectance = 1, edge_tint = [0, 0, 0] }",
+            "reflectance and edge_tint",
+        ),
+        (
+            "{ reflectance = [1, 1, \"1\"], edge_tint = [0, 0, 0] }",
+            "reflectance and edge_tint",
+        ),
+        (
+            "{ reflectance = [1, 1, 1], edge_color = [0, 0, 0] }",
+            "reflectance and edge_tint",
+        ),
+    ] {
+        let message = refusal(&format!("[metals]\nring = {text}\n"));
+        assert!(message.contains(words), "{text}: {message}");
+    }
 }
 
 #[test]

@@ -28,7 +28,7 @@ layout(set = 2, binding = 2) uniform textureBuffer scene_normals;    // by verte
 layout(set = 2, binding = 3) uniform textureBuffer scene_uvs;        // set 0, set 1
 layout(set = 2, binding = 4) uniform textureBuffer scene_tangents;
 layout(set = 2, binding = 5) uniform textureBuffer scene_colors;
-layout(set = 2, binding = 6) uniform utextureBuffer scene_materials;
+layout(set = 2, binding = 6) uniform utextureBuffer scene_materials;  // records, then nodes of tables of metals, the last one first
 layout(set = 2, binding = 7) uniform utextureBuffer scene_textures;
 layout(set = 2, binding = 8) uniform utextureBuffer scene_texels;    // RGBA8
 layout(set = 2, binding = 9) uniform utextureBuffer scene_lights;
@@ -53,6 +53,12 @@ vec4 environment_texel(uint index) {
 float albedo_table(uint index) {
     count_fetches(1u, 1u);
     return texelFetch(scene_albedo_table, int(index)).x;
+}
+
+// A node of the tables of metals that name one.
+vec4 fresnel_table(uint index) {
+    count_quarters(1u);
+    return uintBitsToFloat(texelFetch(scene_materials, textureSize(scene_materials) - 1 - int(index)));
 }
 
 uvec4 material_quarter(uint material, uint quarter) { return texelFetch(scene_materials, int(MATERIAL_QUARTERS * material + quarter)); }

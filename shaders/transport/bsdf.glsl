@@ -12,9 +12,9 @@
 // (wo.z < 0) the diffuse base is black: what glTF calls its opaque part absorbs.
 // Frame: z is the shading normal; of a solid it points out of the body. Opaque and thin surfaces scatter alike on both sides.
 // Expects, declared before the inclusion: bool constants HAS_METAL, HAS_EXACT_CONDUCTOR, HAS_SCHLICK_CONDUCTOR, HAS_COMPENSATED_CONDUCTOR,
-// HAS_TINTED_CONDUCTOR, HAS_SIMPLIFIED_CONDUCTOR, HAS_CLASSIC_MICROFACETS, HAS_PHONG, HAS_SPECULAR_LAYER,
+// HAS_TINTED_CONDUCTOR, HAS_SIMPLIFIED_CONDUCTOR, HAS_TABLE_CONDUCTOR, HAS_CLASSIC_MICROFACETS, HAS_PHONG, HAS_SPECULAR_LAYER,
 // HAS_TRANSMISSION, HAS_MULTIPLE_SCATTERING, SEPARABLE_MASKING; `float albedo_table(uint)`, read only if HAS_SPECULAR_LAYER or
-// HAS_MULTIPLE_SCATTERING.
+// HAS_MULTIPLE_SCATTERING; `vec4 fresnel_table(uint)`, read only if HAS_TABLE_CONDUCTOR.
 #ifndef CLERESTORY_TRANSPORT_BSDF_GLSL
 #define CLERESTORY_TRANSPORT_BSDF_GLSL
 
@@ -22,6 +22,7 @@
 #include "transport/choice.glsl"
 #include "transport/fresnel.glsl"
 #include "transport/fresnel_forms.glsl"
+#include "transport/fresnel_table.glsl"
 #include "transport/ggx.glsl"
 #include "transport/microfacets.glsl"
 #include "transport/phong.glsl"
@@ -52,6 +53,7 @@ const uint BSDF_BECKMANN = 512u;
 const uint BSDF_COSINE_LOBE = 1024u;
 const uint BSDF_SIMPLIFIED_G = 2048u;
 const uint BSDF_SMITH_G = 4096u;
+const uint BSDF_TABLE_CONDUCTOR = 8192u;  // the metal is a conductor by a table, whose number stands in the first band of conductor_a
 const uint BSDF_CLASSIC_FLAGS = BSDF_CLASSIC | BSDF_BECKMANN | BSDF_COSINE_LOBE | BSDF_SIMPLIFIED_G | BSDF_SMITH_G;
 
 // A rough solid whose index is that of its surroundings has no defined half vector: it is given this index.
@@ -147,6 +149,9 @@ vec3 metal_fresnel(Bsdf b, float cos_h) {
     if (HAS_SIMPLIFIED_CONDUCTOR && (b.flags & BSDF_SIMPLIFIED_CONDUCTOR) != 0u) {
         return fresnel_simplified(cos_h, b.conductor_a, b.conductor_b);
     }
+    if (HAS_TABLE_CONDUCTOR && (b.flags & BSDF_TABLE_CONDUCTOR) != 0u) {
+        return fresnel_tabulated(uint(b.conductor_a.x), cos_h);
+    }
     return fresnel_schlick(cos_h, b.base_color);
 }
 
@@ -203,7 +208,7 @@ vec4 classic_eval(Bsdf b, vec3 wo, vec3 wi) {
 uint conductor_flags() {
     return (HAS_EXACT_CONDUCTOR ? BSDF_EXACT_CONDUCTOR : 0u) | (HAS_SCHLICK_CONDUCTOR ? BSDF_SCHLICK_CONDUCTOR : 0u)
         | (HAS_COMPENSATED_CONDUCTOR ? BSDF_COMPENSATED_CONDUCTOR : 0u) | (HAS_TINTED_CONDUCTOR ? BSDF_TINTED_CONDUCTOR : 0u)
-        | (HAS_SIMPLIFIED_CONDUCTOR ? BSDF_SIMPLIFIED_CONDUCTOR : 0u);
+        | (HAS_SIMPLIFIED_CONDUCTOR ? BSDF_SIMPLIFIED_CONDUCTOR : 0u) | (HAS_TABLE_CONDUCTOR ? BSDF_TABLE_CONDUCTOR : 0u);
 }
 
 // Whether the metal is a conductor by its index, in any form, not of a base colour.

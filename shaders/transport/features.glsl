@@ -29,6 +29,7 @@ layout(constant_id = 30) const bool HAS_SCHLICK_CONDUCTOR = true;      // Schlic
 layout(constant_id = 31) const bool HAS_COMPENSATED_CONDUCTOR = true;  // with a term of two coefficients
 layout(constant_id = 32) const bool HAS_TINTED_CONDUCTOR = true;       // with a term of one
 layout(constant_id = 33) const bool HAS_SIMPLIFIED_CONDUCTOR = true;   // without the sine
+layout(constant_id = 37) const bool HAS_TABLE_CONDUCTOR = true;        // by tables behind the materials
 layout(constant_id = 34) const bool HAS_CLASSIC_MICROFACETS = true;    // metals with others than GGX under Smith's masking
 
 layout(constant_id = 23) const bool HAS_LIGHT_TREE = false;            // lights are chosen by a tree, for the point that they are to light

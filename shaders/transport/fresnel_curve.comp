@@ -62,7 +62,7 @@ vec3 curve_at(float c) {
         return fresnel_simplified(c, eta, k);
     }
     case CURVE_TABLE:
-        return fresnel_table_lookup(c);
+        return fresnel_table_lookup(0u, c);
     default:
         return vec3(c) + drift;
     }

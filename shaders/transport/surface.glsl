@@ -84,7 +84,8 @@ Surface surface_at(Hit hit, vec3 scene_lower, vec3 scene_upper) {
 // Quarters of a material that a scene's surfaces read: base colour; emission and flags; the layer and the metal, with their index and what transmits; the way inside;
 // how metallic; textures.
 uint surface_material_quarters() {
-    bool conductor = HAS_EXACT_CONDUCTOR || HAS_SCHLICK_CONDUCTOR || HAS_COMPENSATED_CONDUCTOR || HAS_TINTED_CONDUCTOR || HAS_SIMPLIFIED_CONDUCTOR;
+    bool conductor = HAS_EXACT_CONDUCTOR || HAS_SCHLICK_CONDUCTOR || HAS_COMPENSATED_CONDUCTOR || HAS_TINTED_CONDUCTOR || HAS_SIMPLIFIED_CONDUCTOR
+        || HAS_TABLE_CONDUCTOR;
     bool flags = HAS_AREA_LIGHTS || HAS_UNLIT || HAS_METAL || conductor || HAS_PHONG;
     bool layer = HAS_METAL || HAS_SPECULAR_LAYER || HAS_TRANSMISSION;
     bool inside = HAS_TRANSMISSION || HAS_ABSORPTION;
@@ -121,7 +122,7 @@ Bsdf surface_bsdf(SceneMaterial m, Surface s) {
     }
     // The forms' flags of materials are those of scattering functions, shifted.
     uint form = (m.flags >> MATERIAL_FORM_SHIFT) & conductor_flags() & ~BSDF_EXACT_CONDUCTOR;
-    if ((HAS_SCHLICK_CONDUCTOR || HAS_COMPENSATED_CONDUCTOR || HAS_TINTED_CONDUCTOR || HAS_SIMPLIFIED_CONDUCTOR) && form != 0u) {
+    if ((HAS_SCHLICK_CONDUCTOR || HAS_COMPENSATED_CONDUCTOR || HAS_TINTED_CONDUCTOR || HAS_SIMPLIFIED_CONDUCTOR || HAS_TABLE_CONDUCTOR) && form != 0u) {
         b.conductor_a = m.conductor_a;
         b.conductor_b = m.conductor_b;
         b.conductor_c = m.conductor_c;

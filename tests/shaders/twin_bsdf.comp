@@ -11,6 +11,7 @@ const bool HAS_SCHLICK_CONDUCTOR = true;
 const bool HAS_COMPENSATED_CONDUCTOR = true;
 const bool HAS_TINTED_CONDUCTOR = true;
 const bool HAS_SIMPLIFIED_CONDUCTOR = true;
+const bool HAS_TABLE_CONDUCTOR = true;
 const bool HAS_CLASSIC_MICROFACETS = true;
 const bool HAS_PHONG = true;
 const bool HAS_SPECULAR_LAYER = true;
@@ -19,6 +20,14 @@ const bool HAS_MULTIPLE_SCATTERING = true;
 const bool SEPARABLE_MASKING = false;
 
 float albedo_table(uint index) { return twin_table[index]; }
+
+#include "transport/albedo.glsl"
+
+// Nodes stand behind the albedos.
+vec4 fresnel_table(uint index) {
+    uint first = AVERAGE_BASE + (ETA_NODES + 2u) * ALPHA_NODES + 4u * index;
+    return vec4(twin_table[first], twin_table[first + 1u], twin_table[first + 2u], twin_table[first + 3u]);
+}
 
 #include "transport/bsdf.glsl"
 

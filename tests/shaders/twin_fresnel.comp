@@ -56,7 +56,10 @@ void main() {
         break;
     }
     case 2u: {  // with the geometric term
-        out3(0u, fresnel_table_lookup(cos_i));
+        out3(0u, fresnel_table_lookup(0u, cos_i));
+        out3(3u, fresnel_tabulated(0u, cos_i));
+        // The same table again, behind the first.
+        out3(6u, fresnel_tabulated(1u, cos_i));
         break;
     }
     }

@@ -29,7 +29,7 @@ pub enum Way {
 
 impl Way {
     /// All but the exact one.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Form(FresnelForm::Schlick),
         Self::Form(FresnelForm::Rescaled),
         Self::PrintedRule,
@@ -37,6 +37,7 @@ impl Way {
         Self::Form(FresnelForm::F82Tint),
         Self::Form(FresnelForm::Hoffman),
         Self::Form(FresnelForm::Simplified),
+        Self::Form(FresnelForm::Table),
     ];
 
     /// What tables call it.

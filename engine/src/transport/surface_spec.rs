@@ -17,6 +17,7 @@ macro_rules! surface_spec {
             has_compensated_conductor: bsdf.compensated_conductor,
             has_tinted_conductor: bsdf.tinted_conductor,
             has_simplified_conductor: bsdf.simplified_conductor,
+            has_table_conductor: bsdf.table_conductor,
             has_classic_microfacets: bsdf.classic_microfacets,
             has_phong: bsdf.phong,
             has_specular_layer: bsdf.specular_layer,
@@ -60,7 +61,7 @@ pub(crate) use emission_spec;
 
 /// The specialization constants of kernels that know surfaces (`transport/features.glsl`) that are off for some scenes: by name, what each stands for, and why it
 /// is off where nothing else is known.
-pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 27] = [
+pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 28] = [
     ("has_metal", METAL_LOBES, "no material is metal"),
     (
         "has_exact_conductor",
@@ -87,6 +88,7 @@ pub(crate) const SURFACE_FEATURES: [(&str, &str, &str); 27] = [
         "simplified factor of conductors",
         "no metal names it",
     ),
+    ("has_table_conductor", "tables of conductors", "no metal names them"),
     (
         "has_specular_layer",
         "dielectric reflection",

@@ -213,7 +213,7 @@ fn plates() -> (Scene, Vec<SpectralMetal>) {
             classic_microfacets,
             ..Material::mirror("gold", Vec3::ONE)
         });
-        let at = |x: f32, z: f32| Vec3::new(WIDTH * (f32::from(place) + x - 4.5), 0.0, z);
+        let at = |x: f32, z: f32| Vec3::new(WIDTH * (f32::from(place) + x - 5.0), 0.0, z);
         scene.place(quad(
             "plate",
             material,

@@ -4,7 +4,10 @@
 //! the z-test of `film::z_test` (Šidák at 1 %; 99.75 % accepted where tails are heavy). Samples are independent (PCG), so z-scores are what they say.
 
 use std::f64::consts::PI;
+use std::path::Path;
 
+use clerestory::scene::metals::artistic::artistic_index;
+use clerestory::scene::sidecar::Sidecar;
 use clerestory::scene::{
     Distribution, Environment, FresnelForm, Geometry, LightKind, Material, Mesh, Microfacets, Scene, metals,
 };
@@ -12,6 +15,7 @@ use clerestory::techniques::PathTracerSettings;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{Bsdf, BsdfContext, BsdfFeatures, LOBE_ALL, bsdf_sample};
 use clerestory::transport::fresnel::form::MetalFresnel;
+use clerestory::transport::fresnel::fresnel_conductor;
 use clerestory::transport::phong::phong_eval;
 use clerestory::transport::warp::square_to_cosine_hemisphere;
 use clerestory_hard_cases::scenes::orthographic;
@@ -582,6 +586,90 @@ fn metal_floors_under_a_sky_reflect_by_the_form_they_name() {
             let picture = render(gpu, &scene, SMALL, 512, &independent());
             picture.expect_uniform(&format!("{distribution:?}, {geometry:?}"), albedo.to_array(), 1e-3);
         }
+    });
+}
+
+/// A metal that a sidecar describes by a reflectance and an edge tint shows its reflectance to who looks straight down, aslant the exact factor of its n and k, and
+/// gives the bits of the picture that these give.
+#[test]
+fn metals_by_two_colours_show_their_reflectance_and_are_exact() {
+    with_gpu(|gpu| {
+        let colors = [[0.95f32, 0.64, 0.54], [0.9, 0.4, 0.0]];
+        let floor_of = |metal: &str, roughness: f32| {
+            let mut scene = lambert_floor();
+            scene.materials[0] = Material {
+                roughness,
+                ..Material::mirror("floor", Vec3::ONE)
+            };
+            scene.environment = Some(Environment::uniform(Vec3::ONE));
+            let sidecar = Sidecar::parse(&format!("[metals]\nfloor = {metal}\n"), Path::new("floor.scene.toml"));
+            sidecar.unwrap().apply(&mut scene).unwrap();
+            scene
+        };
+        let seen_at = |mut scene: Scene, cosine: f64| {
+            let sine = (1.0 - cosine * cosine).sqrt();
+            scene.cameras[0] = orthographic(10.0 * DVec3::new(sine, cosine, 0.0), DVec3::ZERO, DVec3::Z, 0.2);
+            render(gpu, &scene, SMALL, 4, &independent())
+        };
+        let by_colors = format!("{{ reflectance = {:?}, edge_tint = {:?} }}", colors[0], colors[1]);
+        let [eta, k] = artistic_index(Vec3::from(colors[0]).as_dvec3(), Vec3::from(colors[1]).as_dvec3());
+        let smooth = floor_of(&by_colors, 0.0);
+        let down = seen_at(smooth.clone(), 1.0);
+        for (shown, expected) in down.mean().into_iter().zip(colors[0]) {
+            assert!((shown.0 - f64::from(expected)).abs() < 1e-6, "{} {expected}", shown.0);
+        }
+        let aslant = seen_at(smooth, 0.15);
+        aslant.expect_uniform("aslant", fresnel_conductor(0.15, eta, k).to_array(), 1e-5);
+        // TOML reads what Rust writes of an f32.
+        let [eta, k] = [eta, k].map(|part| part.as_vec3().to_array());
+        let by_index = format!("{{ eta = {eta:?}, k = {k:?} }}");
+        let [rough, of_index] = [by_colors, by_index].map(|metal| seen_at(floor_of(&metal, 0.6), 0.5));
+        assert_eq!(rough.bits(), of_index.bits());
+    });
+}
+
+/// Two metals by tables, and one whose index is that of the first, side by side: each shows its own factor, and an exact metal between them what it shows without
+/// tables in the scene.
+#[test]
+fn metals_by_tables_have_each_their_own() {
+    with_gpu(|gpu| {
+        let named = |name: &str| metals::by_name(name).expect("metal");
+        let cosine = 0.4f64;
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let shown = |fresnel: FresnelForm, seen: usize| {
+            let mut scene = Scene::default();
+            let kinds = [
+                ("silver", fresnel),
+                ("copper", FresnelForm::Exact),
+                ("gold", fresnel),
+                ("silver", fresnel),
+            ];
+            for (place, (name, fresnel)) in (0u8..).zip(kinds) {
+                let material = scene.add_material(Material {
+                    conductor: Some(named(name)),
+                    fresnel,
+                    ..Material::mirror(name, Vec3::ONE)
+                });
+                let mut plate = floor(name, material, 1.0, 0.0);
+                for corner in &mut plate.positions {
+                    corner.z += 2.0 * f32::from(place);
+                }
+                scene.place(plate);
+            }
+            scene.environment = Some(Environment::uniform(Vec3::ONE));
+            let middle = DVec3::Z * (2.0 * seen as f64);
+            let eye = middle + 10.0 * DVec3::new(sine, cosine, 0.0);
+            scene.cameras.push(orthographic(eye, middle, DVec3::Z, 0.2));
+            (kinds[seen], render(gpu, &scene, SMALL, 4, &independent()))
+        };
+        for seen in 0..4 {
+            let ((name, fresnel), picture) = shown(FresnelForm::Table, seen);
+            let ior = named(name);
+            let factor = MetalFresnel::new(fresnel, ior.eta.as_dvec3(), ior.k.as_dvec3());
+            picture.expect_uniform(name, factor.at(cosine).to_array(), 1e-5);
+        }
+        let [beside, alone] = [FresnelForm::Table, FresnelForm::Exact].map(|fresnel| shown(fresnel, 1).1);
+        assert_eq!(beside.bits(), alone.bits());
     });
 }
 

@@ -152,6 +152,11 @@ fn features_are_those_of_the_scene() {
                 &["has_metal", "has_multiple_scattering", "has_simplified_conductor"],
             ),
             (
+                "table",
+                metal_of(FresnelForm::Table),
+                &["has_metal", "has_multiple_scattering", "has_table_conductor"],
+            ),
+            (
                 "classical",
                 {
                     let mut scene = metal_of(FresnelForm::Exact);
@@ -364,6 +369,7 @@ fn features_that_are_compiled_in_without_need_change_no_bit() {
                 "has_compensated_conductor",
                 "has_tinted_conductor",
                 "has_simplified_conductor",
+                "has_table_conductor",
                 "has_classic_microfacets",
                 "has_phong",
                 "has_specular_layer",

@@ -4,10 +4,13 @@ use clerestory::scene::FresnelForm;
 use clerestory::transport::albedo::AlbedoTable;
 use clerestory::transport::bsdf::{
     BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_PHONG,
-    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G, BSDF_TINTED_CONDUCTOR, Bsdf,
-    BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf, bsdf_sample,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G, BSDF_TABLE_CONDUCTOR,
+    BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext, BsdfFeatures, GltfFactors, LOBE_ALL, bsdf_eval_pdf, bsdf_gltf,
+    bsdf_sample,
 };
 use clerestory::transport::fresnel::form::MetalFresnel;
+use clerestory::transport::fresnel::fresnel_conductor;
+use clerestory::transport::fresnel::table::fresnel_table;
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Tolerance, U, compare, trigonometric_error};
 use clerestory_tests::{twin_kernel, with_gpu};
@@ -23,11 +26,14 @@ fn the_scattering_function_agrees_with_its_twin() {
         let metal = (DVec3::new(0.2, 0.4, 1.4), DVec3::new(4.0, 2.4, 1.6));
         let parameters = |form| MetalFresnel::new(form, metal.0, metal.1).parameters();
         let exact = parameters(FresnelForm::Exact);
+        // The device has the table, the twin the index that it is of.
+        let by_table = [DVec3::ZERO, DVec3::ZERO, parameters(FresnelForm::Table)[2]];
         let forms = [
             (parameters(FresnelForm::Rescaled), BSDF_SCHLICK_CONDUCTOR),
             (parameters(FresnelForm::Compensated), BSDF_COMPENSATED_CONDUCTOR),
             (parameters(FresnelForm::Hoffman), BSDF_TINTED_CONDUCTOR),
             (parameters(FresnelForm::Simplified), BSDF_SIMPLIFIED_CONDUCTOR),
+            (by_table, BSDF_TABLE_CONDUCTOR),
         ];
         let make = |seed: u64, same_side: bool| {
             cases(seed, |r| {
@@ -110,19 +116,26 @@ fn the_scattering_function_agrees_with_its_twin() {
                 specular_color: v3(x, 8),
                 thickness: x[11],
             });
+            let flags = b.flags | (x[21] as f32).to_bits();
+            let [conductor_a, conductor_b] = match flags & BSDF_TABLE_CONDUCTOR {
+                0 => [v3(x, 12), v3(x, 15)],
+                _ => [metal.0, metal.1],
+            };
             Bsdf {
-                conductor_a: v3(x, 12),
-                conductor_b: v3(x, 15),
+                conductor_a,
+                conductor_b,
                 conductor_c: v3(x, 18),
-                flags: b.flags | (x[21] as f32).to_bits(),
+                flags,
                 ..b
             }
         };
+        let nodes = fresnel_table(|c| fresnel_conductor(c, metal.0, metal.1));
+        let tables = [&context.table.values[..], nodes.as_flattened()].concat();
         // Half vectors of narrow lobes magnify rounding of the directions by 1/α²: the inputs' share of the tolerance carries it.
         let tolerance = ulps(256.0, 8.0, 256.0 * U);
         for same_side in [true, false] {
             let table = make(20 + u64::from(same_side), same_side);
-            let results = twin_bsdf(gpu, 0, &table, &context.table.values);
+            let results = twin_bsdf(gpu, 0, &table, &tables);
             compare("bsdf_eval_pdf", &table, &results, tolerance, 0..28, |x| {
                 if x[21].is_nan() {
                     return vec![0.0; 4];
@@ -132,7 +145,7 @@ fn the_scattering_function_agrees_with_its_twin() {
             });
         }
         let table = make(30, true);
-        let results = twin_bsdf(gpu, 1, &table, &context.table.values);
+        let results = twin_bsdf(gpu, 1, &table, &tables);
         let sampled = Tolerance {
             absolute: 16.0 * trigonometric_error(gpu),
             ..tolerance

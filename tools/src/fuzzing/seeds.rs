@@ -268,6 +268,7 @@ strength = 2.0
 
 [metals]
 red = { eta = [1.4, 0.9, 0.7], k = [7.6, 6.4, 5.6] }
+lamp = { reflectance = [0.9, 0.7, 0.4], edge_tint = [0.8, 0.6, 0.5], fresnel = \"simplified\" }
 
 [[cameras]]
 name = \"main\"

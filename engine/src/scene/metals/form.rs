@@ -19,11 +19,13 @@ pub enum FresnelForm {
     Hoffman,
     /// Fresnel's equations without the sine in their root.
     Simplified,
+    /// Fresnel's equations from a table of 4 KiB, which holds them times the simplified geometric term.
+    Table,
 }
 
 impl FresnelForm {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Exact,
         Self::Schlick,
         Self::Rescaled,
@@ -31,6 +33,7 @@ impl FresnelForm {
         Self::F82Tint,
         Self::Hoffman,
         Self::Simplified,
+        Self::Table,
     ];
 
     /// Its name, as sidecars write it.
@@ -43,6 +46,7 @@ impl FresnelForm {
             Self::F82Tint => "f82-tint",
             Self::Hoffman => "hoffman",
             Self::Simplified => "simplified",
+            Self::Table => "table",
         }
     }
 }

@@ -14,8 +14,8 @@
 //! [metals]                      # by material name
 //! ring = "gold"                 # gold, silver, copper, aluminium, iron, chromium, titanium, nickel, cobalt
 //! bowl = { eta = [1.4, 0.9, 0.7], k = [7.6, 6.4, 5.6] }
-//! vase = { metal = "gold", fresnel = "compensated" }  # exact, schlick, rescaled, compensated, f82-tint, hoffman, simplified
-//! cup = { reflectance = [0.9, 0.7, 0.4], edge_tint = [0.8, 0.6, 0.5] }
+//! vase = { metal = "gold", fresnel = "compensated" }  # exact, schlick, rescaled, compensated, f82-tint, hoffman, simplified, table
+//! cup = { reflectance = [0.9, 0.7, 0.4], edge_tint = [0.8, 0.6, 0.5] }  # at normal incidence, up to 0.9999, and near grazing incidence; 0 to 1
 //! coin = { spectrum = "coin.csv" }                    # lines of a wavelength in nanometres, n, k
 //! pan = { metal = "copper", distribution = "beckmann", geometry = "cook-torrance" }  # ggx, beckmann, cosine-lobe; cook-torrance, simplified, smith
 //!
@@ -48,6 +48,7 @@ use serde::Deserialize;
 
 use medium::MediumTable;
 
+use super::metals::artistic::REFLECTANCE_MAX;
 use super::{
     Camera, ConductorIor, Distribution, Environment, FresnelForm, Geometry, Material, Microfacets, Note, Projection,
     Scene, builtin, files, metals, phong_roughness,
@@ -99,8 +100,8 @@ struct EnvironmentTable {
 #[serde(
     untagged,
     expecting = "a metal's name, or a table with metal, spectrum, eta and k, or reflectance and edge_tint, and if wanted fresnel: exact, \
-                 schlick, rescaled, compensated, f82-tint, hoffman or simplified; distribution: ggx, beckmann or cosine-lobe; geometry: \
-                 cook-torrance, simplified or smith"
+                 schlick, rescaled, compensated, f82-tint, hoffman, simplified or table; distribution: ggx, beckmann or cosine-lobe; \
+                 geometry: cook-torrance, simplified or smith"
 )]
 enum Metal {
     Named(String),
@@ -332,6 +333,16 @@ impl Sidecar {
             let cause = "names microfacets, which need a material without transmission and without a texture of metal and roughness";
             self.require(materials.all(is_metal), &key, cause)?;
         }
+        if let Metal::Described(table) = metal
+            && let Some(reflectance) = table.reflectance
+            && reflectance.iter().any(|r| *r > REFLECTANCE_MAX as f32)
+        {
+            scene.notes.push(Note {
+                feature: format!("reflectance above {}", REFLECTANCE_MAX as f32),
+                at: key.clone(),
+                instead: format!("it is taken as {}: 1 needs an infinite index", REFLECTANCE_MAX as f32),
+            });
+        }
         self.change_materials(scene, named, [&key, name], |material| {
             material.conductor = Some(conductor);
             material.fresnel = fresnel;
@@ -369,9 +380,12 @@ impl Sidecar {
                 Ok(index)
             }
             (2, .., Some((reflectance, edge_tint))) => {
-                let sound = reflectance.iter().chain(&edge_tint).all(|x| (0.0..=1.0).contains(x));
-                self.require(sound, key, "needs reflectance and edge_tint from 0 to 1")?;
-                Ok(metals::by_colors(reflectance.into(), edge_tint.into()))
+                metals::by_colors(reflectance.into(), edge_tint.into()).map_err(|error| match error {
+                    Error::Setting { name, value, cause } => {
+                        self.fault(&format!("{key}.{name}"), format!("{value} {cause}"))
+                    }
+                    other => other,
+                })
             }
             _ => Err(self.fault(
                 key,
@@ -622,6 +636,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     tests: &[
         "engine/tests/scene_load.rs::a_sidecar_adds_what_the_model_cannot_say",
         "engine/tests/scene_load.rs::metals_are_named_measured_or_coloured_and_name_their_form",
+        "engine/tests/scene_load.rs::two_colours_of_a_metal_are_kept_or_refused",
         "engine/tests/scene_load.rs::modified_phong_surfaces_are_loaded_and_checked",
         "engine/tests/scene_load.rs::sidecar_faults_have_their_line_or_key",
     ],

@@ -22,6 +22,8 @@ pub struct BsdfFeatures {
     pub tinted_conductor: bool,
     /// Some conductor has the simplified factor.
     pub simplified_conductor: bool,
+    /// Some conductor has a table of its factor.
+    pub table_conductor: bool,
     /// Some metal has classical microfacets.
     pub classic_microfacets: bool,
     /// Some metal is a modified Phong lobe.
@@ -45,6 +47,7 @@ impl BsdfFeatures {
         compensated_conductor: true,
         tinted_conductor: true,
         simplified_conductor: true,
+        table_conductor: true,
         classic_microfacets: true,
         phong: true,
         specular_layer: true,
@@ -60,6 +63,7 @@ impl BsdfFeatures {
         compensated_conductor: false,
         tinted_conductor: false,
         simplified_conductor: false,
+        table_conductor: false,
         classic_microfacets: false,
         phong: false,
         specular_layer: false,
@@ -81,6 +85,7 @@ impl BsdfFeatures {
                 compensated_conductor: f.compensated_conductor || m.has_conductor(&[FresnelForm::Compensated]),
                 tinted_conductor: f.tinted_conductor || m.has_conductor(&[FresnelForm::F82Tint, FresnelForm::Hoffman]),
                 simplified_conductor: f.simplified_conductor || m.has_conductor(&[FresnelForm::Simplified]),
+                table_conductor: f.table_conductor || m.has_conductor(&[FresnelForm::Table]),
                 classic_microfacets: f.classic_microfacets || m.classic_microfacets.is_some(),
                 phong: f.phong || (m.metallic > 0.0 && m.phong),
                 specular_layer: f.specular_layer

@@ -7,12 +7,13 @@ use glam::DVec3;
 use super::{
     BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_IMPORTANCE,
     BSDF_PHONG, BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G,
-    BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION, LOBE_SPECULAR,
-    LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
+    BSDF_TABLE_CONDUCTOR, BSDF_TINTED_CONDUCTOR, Bsdf, BsdfContext, LOBE_DIFFUSE, LOBE_GLOSSY, LOBE_REFLECTION,
+    LOBE_SPECULAR, LOBE_TRANSMISSION, LOSS_MIN, lobe_allowed, mean3,
 };
 use crate::transport::albedo::{albedo_average, albedo_layer, albedo_lookup};
 use crate::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
 use crate::transport::fresnel::simplified::fresnel_simplified;
+use crate::transport::fresnel::table::fresnel_tabulated;
 use crate::transport::fresnel::tinted::fresnel_tinted;
 use crate::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_f0, fresnel_schlick};
 use crate::transport::ggx::{ggx_d, ggx_g1, ggx_visible_pdf};
@@ -104,6 +105,7 @@ impl BsdfContext<'_> {
             BSDF_COMPENSATED_CONDUCTOR => fresnel_compensated(cos_h, eta, k, exponent),
             BSDF_TINTED_CONDUCTOR => fresnel_tinted(cos_h, eta, k),
             BSDF_SIMPLIFIED_CONDUCTOR => fresnel_simplified(cos_h, eta, k),
+            BSDF_TABLE_CONDUCTOR => fresnel_tabulated(cos_h, |c| fresnel_conductor(c, eta, k)),
             _ => fresnel_schlick(cos_h, b.base_color),
         }
     }
@@ -117,6 +119,7 @@ impl BsdfContext<'_> {
             (f.compensated_conductor, BSDF_COMPENSATED_CONDUCTOR),
             (f.tinted_conductor, BSDF_TINTED_CONDUCTOR),
             (f.simplified_conductor, BSDF_SIMPLIFIED_CONDUCTOR),
+            (f.table_conductor, BSDF_TABLE_CONDUCTOR),
         ]
         .into_iter()
         .filter_map(|(on, flag)| on.then_some(flag))

@@ -62,6 +62,8 @@ pub const BSDF_COMPENSATED_CONDUCTOR: u32 = constants::BSDF_COMPENSATED_CONDUCTO
 pub const BSDF_TINTED_CONDUCTOR: u32 = constants::BSDF_TINTED_CONDUCTOR;
 /// The metal is `conductor_a` + i `conductor_b` by the simplified factor.
 pub const BSDF_SIMPLIFIED_CONDUCTOR: u32 = constants::BSDF_SIMPLIFIED_CONDUCTOR;
+/// The metal is `conductor_a` + i `conductor_b` by a table of the exact factor; the device has the number of the table in the first band of `conductor_a`.
+pub const BSDF_TABLE_CONDUCTOR: u32 = constants::BSDF_TABLE_CONDUCTOR;
 /// The metal's microfacets are not GGX's under Smith's masking with compensation; with the next four bits it says which they are.
 pub const BSDF_CLASSIC: u32 = constants::BSDF_CLASSIC;
 /// Beckmann's distribution.

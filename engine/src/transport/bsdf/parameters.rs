@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::{
     BSDF_BECKMANN, BSDF_CLASSIC, BSDF_COMPENSATED_CONDUCTOR, BSDF_COSINE_LOBE, BSDF_EXACT_CONDUCTOR, BSDF_PHONG,
-    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G, BSDF_THIN,
-    BSDF_TINTED_CONDUCTOR, ETA_MATCHED,
+    BSDF_SCHLICK_CONDUCTOR, BSDF_SIMPLIFIED_CONDUCTOR, BSDF_SIMPLIFIED_G, BSDF_SMITH_G, BSDF_TABLE_CONDUCTOR,
+    BSDF_THIN, BSDF_TINTED_CONDUCTOR, ETA_MATCHED,
 };
 use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets};
 use crate::transport::fresnel::form::MetalFresnel;
@@ -47,6 +47,7 @@ pub(crate) fn conductor_flag(fresnel: &MetalFresnel) -> u32 {
         MetalFresnel::Compensated { .. } => BSDF_COMPENSATED_CONDUCTOR,
         MetalFresnel::Tinted { .. } => BSDF_TINTED_CONDUCTOR,
         MetalFresnel::Simplified { .. } => BSDF_SIMPLIFIED_CONDUCTOR,
+        MetalFresnel::Table { .. } => BSDF_TABLE_CONDUCTOR,
     }
 }
 

@@ -8,11 +8,11 @@ use std::f64::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use super::*;
-use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets, phong_roughness};
+use crate::scene::{ConductorIor, Distribution, FresnelForm, Geometry, Material, Microfacets, metals, phong_roughness};
 use crate::test_random::Random;
 use crate::transport::albedo::{AlbedoTable, albedo_average, albedo_lookup, integrate_albedos};
 use crate::transport::fresnel::form::MetalFresnel;
-use crate::transport::fresnel::{fresnel_dielectric, fresnel_schlick};
+use crate::transport::fresnel::{fresnel_conductor, fresnel_dielectric, fresnel_schlick};
 use crate::transport::ggx::{ALPHA_MIN, ggx_stretched_cos};
 use crate::transport::random::{Sampler, SamplerKind, sample_1d, sample_2d};
 use crate::transport::testing::{random3, sphere_test};
@@ -276,6 +276,7 @@ fn metals_reflect_by_the_form_they_name() {
             features.compensated_conductor,
             features.tinted_conductor,
             features.simplified_conductor,
+            features.table_conductor,
         ];
         assert_eq!(compiled.iter().filter(|on| **on).count(), 1, "{form}: {compiled:?}");
         assert_eq!(features.exact_conductor, form == FresnelForm::Exact);
@@ -297,6 +298,51 @@ fn metals_reflect_by_the_form_they_name() {
                 (lobes.metal - expected).abs().max_element() < 1e-12,
                 "{form}: {}",
                 lobes.metal
+            );
+        }
+    }
+}
+
+/// A metal by two colours is the exact conductor of the index that Gulbrandsen's formulas, as they are printed, give: no kernel has a branch for it, and it reflects the
+/// first colour at normal incidence.
+#[test]
+fn metals_by_two_colours_are_exact_conductors() {
+    let colors = [Vec3::new(0.95, 0.64, 0.54), Vec3::new(0.9, 0.4, 0.0)];
+    let material = Material {
+        conductor: Some(metals::by_colors(colors[0], colors[1]).expect("colours")),
+        ..Material::mirror("mirror", Vec3::ONE)
+    };
+    let features = BsdfFeatures::of_materials([&material]);
+    let exact = BsdfFeatures {
+        metal: true,
+        exact_conductor: true,
+        multiple_scattering: true,
+        ..BsdfFeatures::NONE
+    };
+    assert_eq!(features, exact);
+    let index = [0, 1, 2].map(|band| {
+        let [r, g] = colors.map(|color| f64::from(color[band]));
+        let [least, greatest] = [(1.0 - r) / (1.0 + r), (1.0 + r.sqrt()) / (1.0 - r.sqrt())];
+        let n = g * least + (1.0 - g) * greatest;
+        let k2 = (r * (n + 1.0).powi(2) - (n - 1.0).powi(2)) / (1.0 - r);
+        [n, k2.max(0.0).sqrt()]
+    });
+    let [eta, k] = [0, 1].map(|part| DVec3::from_array(index.map(|band| band[part])));
+    let b = Bsdf::from_material(&material);
+    for i in 1..=100 {
+        let wo = direction(f64::from(i) / 100.0, 0.7);
+        let s = bsdf_sample(&context(features), &b, wo, random3(i, 32), LOBE_ALL);
+        let expected = fresnel_conductor(wo.z, eta, k);
+        assert!(
+            (s.weight - expected).abs().max_element() < 1e-6,
+            "{wo}: {} {expected}",
+            s.weight
+        );
+        if i == 100 {
+            assert!(
+                (s.weight - colors[0].as_dvec3()).abs().max_element() < 1e-6,
+                "{}",
+                s.weight
             );
         }
     }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::compensated::{compensated_metal, fresnel_compensated, fresnel_compensated_average};
 use super::rescaled::{conductor_f0, fresnel_schlick_average};
 use super::simplified::fresnel_simplified;
+use super::table::fresnel_tabulated;
 use super::tinted::{fresnel_tinted, fresnel_tinted_average, tinted_metal};
 use super::{fresnel_conductor, fresnel_conductor_average, fresnel_schlick};
 use crate::catalogue::{Role, Row, sources};
@@ -51,6 +52,13 @@ pub enum MetalFresnel {
         /// Imaginary part.
         k: DVec3,
     },
+    /// [`fresnel_tabulated`] of the exact factor.
+    Table {
+        /// Real part of the index.
+        eta: DVec3,
+        /// Imaginary part.
+        k: DVec3,
+    },
 }
 
 impl MetalFresnel {
@@ -74,6 +82,7 @@ impl MetalFresnel {
                 Self::Tinted { f0, b }
             }
             FresnelForm::Simplified => Self::Simplified { eta, k },
+            FresnelForm::Table => Self::Table { eta, k },
         }
     }
 
@@ -85,6 +94,7 @@ impl MetalFresnel {
             Self::Compensated { f0, a, alpha } => fresnel_compensated(cos_i, f0, a, alpha),
             Self::Tinted { f0, b } => fresnel_tinted(cos_i, f0, b),
             Self::Simplified { eta, k } => fresnel_simplified(cos_i, eta, k),
+            Self::Table { eta, k } => fresnel_tabulated(cos_i, |c| fresnel_conductor(c, eta, k)),
         }
     }
 
@@ -95,15 +105,15 @@ impl MetalFresnel {
             Self::Schlick { f0 } => fresnel_schlick_average(f0),
             Self::Compensated { f0, a, alpha } => fresnel_compensated_average(f0, a, alpha),
             Self::Tinted { f0, b } => fresnel_tinted_average(f0, b),
-            Self::Simplified { .. } => super::average(|mu| self.at(mu)),
+            Self::Simplified { .. } | Self::Table { .. } => super::average(|mu| self.at(mu)),
         }
     }
 
     /// What materials and scattering functions hold in the three places of a conductor: index and extinction, or what the form has instead, and the
-    /// average, which a compensated curve has in closed form and leaves to its exponents.
+    /// average, which a compensated curve has in closed form and leaves to its exponents. In the device's records the number of a table stands for the index that it is of.
     pub fn parameters(&self) -> [DVec3; 3] {
         match *self {
-            Self::Exact { eta, k } | Self::Simplified { eta, k } => [eta, k, self.average()],
+            Self::Exact { eta, k } | Self::Simplified { eta, k } | Self::Table { eta, k } => [eta, k, self.average()],
             Self::Schlick { f0 } => [f0, DVec3::ZERO, self.average()],
             Self::Compensated { f0, a, alpha } => [f0, a, alpha],
             Self::Tinted { f0, b } => [f0, b, self.average()],
@@ -183,6 +193,8 @@ mod tests {
         // Schlick's errors are printed to a tenth of a percentage point, the others to a hundredth, of which the farthest is 5.5 thousandths off.
         const TENTHS: f64 = 0.05;
         const HUNDREDTHS: f64 = 0.006;
+        // What table.rs says of its interpolation.
+        const TABLE: f64 = 0.06;
         for metal in METALS {
             let what = (metal.name, metal.wavelength);
             let schlick = errors(FresnelForm::Schlick, metal).worst;
@@ -219,6 +231,8 @@ mod tests {
                     simplified.mean
                 );
             }
+            let table = errors(FresnelForm::Table, metal).worst;
+            assert!(table > 0.0 && table < TABLE, "{what:?}: {table}");
             // The printed rule and the fit are compared in compensated.rs; this is the better of them.
             let compensated = errors(FresnelForm::Compensated, metal).worst;
             let best = metal.fitted[2].min(metal.compensated[0]);

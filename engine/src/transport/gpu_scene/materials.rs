@@ -9,6 +9,9 @@ use crate::gpu::shaders::types::SceneMaterial;
 use crate::scene::{AlphaMode, ConductorIor, FresnelForm, Material, Scene};
 use crate::transport::bsdf::{classic_flags, conductor_flag};
 use crate::transport::fresnel::form::MetalFresnel;
+use crate::transport::fresnel::fresnel_conductor;
+use crate::transport::fresnel::table::{NODES, fresnel_table};
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// A metal in records: flags of its Fresnel factor, and what that is evaluated from.
@@ -21,6 +24,8 @@ pub(super) struct Metals {
     known: HashMap<(FresnelForm, [u32; 6]), MetalRecord>,
     /// How many were made.
     made: usize,
+    /// Nodes of the tables of those that name one, table after table.
+    tables: Vec<[f32; 4]>,
 }
 
 impl Metals {
@@ -34,9 +39,30 @@ impl Metals {
                 MetalFresnel::Exact { .. } => MATERIAL_EXACT_CONDUCTOR,
                 _ => conductor_flag(&fresnel) << MATERIAL_FORM_SHIFT,
             };
-            (flags, fresnel.parameters().map(|v| v.as_vec3().to_array()))
+            let mut parameters = fresnel.parameters().map(|v| v.as_vec3().to_array());
+            if let MetalFresnel::Table { eta, k } = fresnel {
+                let number = (self.tables.len() / NODES) as f32;
+                self.tables.extend(fresnel_table(|c| fresnel_conductor(c, eta, k)));
+                [parameters[0], parameters[1]] = [[number, 0.0, 0.0], [0.0; 3]];
+            }
+            (flags, parameters)
         })
     }
+
+    /// Nodes of the tables of those that name one, table after table.
+    pub(super) fn tables(&self) -> &[[f32; 4]] {
+        &self.tables
+    }
+}
+
+/// Records in quarters, and behind them the nodes of all tables from the last to the first, which kernels find from the end.
+pub(super) fn material_quarters<'r>(records: &'r [SceneMaterial], tables: &[[f32; 4]]) -> Cow<'r, [[u32; 4]]> {
+    let records: &[[u32; 4]] = bytemuck::cast_slice(records);
+    if tables.is_empty() {
+        return Cow::Borrowed(records);
+    }
+    let nodes = tables.iter().rev().map(|node| node.map(f32::to_bits));
+    Cow::Owned(records.iter().copied().chain(nodes).collect())
 }
 
 /// All materials with whether some instance places them; last the default one, for meshes that have none.
@@ -134,5 +160,47 @@ mod tests {
             }
         }
         assert_eq!(made.made, 4);
+        assert!(made.tables().is_empty());
+    }
+
+    #[test]
+    fn each_metal_by_a_table_has_one_behind_the_records() {
+        let (mut made, mut textures) = (Metals::default(), Textures::default());
+        let (scene, named) = (Scene::default(), |name: &str| metals::by_name(name).expect("metal"));
+        let materials = [
+            ("gold", FresnelForm::Table),
+            ("gold", FresnelForm::Exact),
+            ("silver", FresnelForm::Table),
+            ("gold", FresnelForm::Table),
+        ]
+        .map(|(name, fresnel)| Material {
+            conductor: Some(named(name)),
+            fresnel,
+            ..Material::mirror(name, glam::Vec3::ONE)
+        });
+        let records = materials
+            .each_ref()
+            .map(|material| material_record(&mut textures, &mut made, &scene, material));
+        let numbers = records.map(|record| record.conductor_a);
+        assert_eq!(
+            [numbers[0], numbers[2], numbers[3]],
+            [[0.0; 3], [1.0, 0.0, 0.0], [0.0; 3]]
+        );
+        assert_eq!(numbers[1], named("gold").eta.to_array());
+        assert_eq!(made.tables().len(), 2 * NODES);
+        let quarters = material_quarters(&records, made.tables());
+        assert_eq!(bytemuck::cast_slice::<_, SceneMaterial>(&quarters[..40]), records);
+        for (number, name) in [(0, "gold"), (1, "silver")] {
+            let (eta, k) = (named(name).eta.as_dvec3(), named(name).k.as_dvec3());
+            let table = fresnel_table(|c| fresnel_conductor(c, eta, k));
+            for (i, node) in table.iter().enumerate() {
+                let found = quarters[quarters.len() - 1 - (number * NODES + i)];
+                assert_eq!(found.map(f32::from_bits), *node, "{name} {i}");
+            }
+        }
+        // Averages are those of the form.
+        let gold = named("gold");
+        let fresnel = MetalFresnel::new(FresnelForm::Table, gold.eta.as_dvec3(), gold.k.as_dvec3());
+        assert_eq!(records[0].conductor_c, fresnel.average().as_vec3().to_array());
     }
 }

@@ -30,7 +30,7 @@ use self::kept::{Keeping, KeptInstances, Room};
 use self::light_tree::TreeOfLights;
 use self::lights::Lights;
 pub(crate) use self::lights::light_record;
-use self::materials::{Metals, material_record, materials_by_use};
+use self::materials::{Metals, material_quarters, material_record, materials_by_use};
 use self::media::GpuMedia;
 use self::punctual::PunctualLights;
 use self::textures::Textures;
@@ -41,7 +41,7 @@ use crate::accel::{DeviceTraversal, IndexBinding, IndexKind, IndexOnDevice, Inde
 use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{self, SHADOW_SURFACES, SHADOW_SURFACES_ALPHA};
 use crate::gpu::shaders::sets::{MediaSet, SceneSet};
-use crate::gpu::shaders::types::{SceneLight, SceneMaterial};
+use crate::gpu::shaders::types::SceneLight;
 use crate::gpu::{Category, DeviceKind, Gpu, SOFTWARE_LOOP_CAP, TexelView};
 use crate::raster::{ObjectTriangles, SurfaceFeatures, Surfaces};
 use crate::scene::{Environment, LightKind, Material, Scene, SceneProfile};
@@ -207,12 +207,13 @@ impl GpuScene {
         if let Some(bodies) = &bodies {
             bodies.enclose(scene, &mut lights.records, &geometry);
         }
+        let quarters = material_quarters(&records, metals.tables());
         let albedo: &[f32] = if bsdf.specular_layer || bsdf.multiple_scattering {
             &AlbedoTable::shared().values
         } else {
             &[]
         };
-        let buffers = SceneBuffers::upload(gpu, &geometry, &records, &textures, &lights, albedo)?;
+        let buffers = SceneBuffers::upload(gpu, &geometry, &quarters, &textures, &lights, albedo)?;
         let has_media = profile.media.any();
         let media = has_media.then(|| GpuMedia::new(gpu, scene)).transpose()?;
         let surrounding = media.as_ref().and_then(|media| media.surrounding);
@@ -547,7 +548,7 @@ impl SceneBuffers {
     fn upload(
         gpu: &Gpu,
         geometry: &Geometry,
-        materials: &[SceneMaterial],
+        materials: &[[u32; 4]],
         textures: &Textures,
         lights: &Lights,
         albedo: &[f32],

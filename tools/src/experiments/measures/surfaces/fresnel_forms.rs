@@ -182,7 +182,7 @@ fn published_error(published: &Published, way: Way) -> Option<f64> {
         Way::Form(FresnelForm::Compensated) => published.compensated,
         Way::Form(FresnelForm::F82Tint | FresnelForm::Hoffman) => published.hoffman,
         Way::Form(FresnelForm::Simplified) => published.simplified,
-        Way::Form(FresnelForm::Exact) => return None,
+        Way::Form(FresnelForm::Exact | FresnelForm::Table) => return None,
     })
 }
 

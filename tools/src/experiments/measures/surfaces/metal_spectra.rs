@@ -93,6 +93,8 @@ pub struct Found {
     waves: Vec<Wave>,
 }
 
+/// Forms whose pictures stand beside that in all bins.
+const SHOWN: [FresnelForm; 3] = [FresnelForm::Exact, FresnelForm::Schlick, FresnelForm::Rescaled];
 /// The exact factor in channels: what the engine does unless it is told otherwise.
 const CHANNELS: &str = "exact";
 
@@ -234,11 +236,11 @@ fn waves(steps: u32) -> Vec<Wave> {
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let forms = context.first(&FresnelForm::ALL, 2);
+        let forms = context.pick(FresnelForm::ALL.to_vec(), vec![FresnelForm::Exact, FresnelForm::Table]);
         let counts = context.pick(vec![8, 12, 16, 24], vec![8]);
         let oracle = Way::Bins(context.pick(ORACLE, 12));
         let ways: Vec<Way> = (forms.iter().map(|form| Way::Channels(*form)))
-            .chain([Way::Colors, Way::Table, Way::Wavelengths])
+            .chain([Way::Colors, Way::Wavelengths])
             .chain(counts.into_iter().map(Way::Bins))
             .collect();
         let metals: Vec<&str> = context
@@ -272,10 +274,7 @@ impl Study for Found {
                     let pixels = way.picture(&gpu, &spectrum, &options)?;
                     let cost = cost.scaled(f64::from(way.pictures()));
                     rows.push(row(metal, *way, cost, &pixels, &truth));
-                    if matches!(
-                        way,
-                        Way::Channels(FresnelForm::Exact | FresnelForm::Schlick | FresnelForm::Rescaled)
-                    ) {
+                    if matches!(way, Way::Channels(form) if SHOWN.contains(form)) {
                         shown.push(pixels);
                     }
                 }
@@ -287,7 +286,8 @@ impl Study for Found {
             },
         )?;
         let squares: Vec<Vec<DVec3>> = shown.iter().map(|pixels| square(pixels, width)).collect();
-        context.picture(PICTURE, &sheet(&squares, width, (forms.len() as u32).min(3) + 1));
+        let columns = 1 + forms.iter().filter(|form| SHOWN.contains(form)).count() as u32;
+        context.picture(PICTURE, &sheet(&squares, width, columns));
         let mut indices = Vec::new();
         for metal in context.first(&METALS, 2) {
             let spectrum = spectrum_of(metal)?;
@@ -325,8 +325,7 @@ impl Study for Found {
             .note(
                 "Channels are means of n and k over what red, green and blue are sensitive to; ways without a number of bins are in channels, but for the three wavelengths 700, 550 and \
                  435 nm. Reflectance and edge tint are those of the channels' n and k, in single precision, by the simplified factor. The table holds the exact factor times the \
-                 simplified geometric term, which is part of its cost; no scene can name it, so that its picture is the exact factor's times what its interpolation does along a \
-                 smooth half pipe. Errors are those of the picture in 41 bins, white being 1, over all pixels of a half pipe seen from above. The cost is that of three bands' Fresnel factor on the device in a chain of 64, times \
+                 simplified geometric term, and the cost is that of a look-up of this product. Errors are those of the picture in 41 bins, white being 1, over all pixels of a half pipe seen from above. The cost is that of three bands' Fresnel factor on the device in a chain of 64, times \
                  the number of pictures; all else that a picture takes is multiplied alike.",
             )
             .and(Findings::of(&self.indices, &[]).long())

@@ -1,6 +1,6 @@
 //! Ways to make pictures of metals of many wavelengths, and the scene that they are made of: a half pipe under a white sky, seen from above.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 
 use clerestory::Result;
 use clerestory::film::picture::RADIANCE;
@@ -12,8 +12,6 @@ use clerestory::scene::metals::bins::Bins;
 use clerestory::scene::metals::{self, IndexSpectrum};
 use clerestory::scene::{Camera, ConductorIor, Environment, FresnelForm, Material, Mesh, Projection, Scene};
 use clerestory::transport::fresnel::curve::CurveForm;
-use clerestory::transport::fresnel::fresnel_conductor;
-use clerestory::transport::fresnel::table::{fresnel_table, fresnel_table_lookup, simplified_geometry};
 use glam::{DVec3, Vec3};
 
 /// Wavelengths in the place of red, green and blue, nm.
@@ -26,8 +24,6 @@ const SEEN: f32 = 0.95;
 pub const GREY: &str = "grey";
 /// Width over height of pictures.
 pub const ASPECT: u32 = 16;
-/// Places across a pixel over which the table's part of it is averaged.
-const TABLE_SAMPLES: u32 = 16;
 
 /// A way to make a picture.
 #[derive(Debug, Clone, Copy)]
@@ -36,8 +32,6 @@ pub enum Way {
     Channels(FresnelForm),
     /// The simplified factor in channels, from reflectance at normal incidence and edge tint.
     Colors,
-    /// The exact factor in channels, from the table that holds it times the simplified geometric term.
-    Table,
     /// The exact factor at three wavelengths.
     Wavelengths,
     /// The exact factor in so many bins.
@@ -50,7 +44,6 @@ impl Way {
         match self {
             Self::Channels(form) => form.name().into(),
             Self::Colors => "reflectance and edge tint".into(),
-            Self::Table => "table".into(),
             Self::Wavelengths => "three wavelengths".into(),
             Self::Bins(count) => bins_name(count),
         }
@@ -59,7 +52,7 @@ impl Way {
     /// How many pictures it takes.
     pub const fn pictures(self) -> u32 {
         match self {
-            Self::Channels(_) | Self::Colors | Self::Table | Self::Wavelengths => 1,
+            Self::Channels(_) | Self::Colors | Self::Wavelengths => 1,
             Self::Bins(count) => count.div_ceil(3),
         }
     }
@@ -73,9 +66,9 @@ impl Way {
                 FresnelForm::Compensated => CurveForm::CompensatedF0,
                 FresnelForm::F82Tint | FresnelForm::Hoffman => CurveForm::Tinted,
                 FresnelForm::Simplified => CurveForm::Simplified,
+                FresnelForm::Table => CurveForm::Table,
             },
             Self::Colors => CurveForm::Artistic,
-            Self::Table => CurveForm::Table,
             Self::Wavelengths | Self::Bins(_) => CurveForm::Exact,
         }
     }
@@ -88,9 +81,9 @@ impl Way {
         let channels = spectrum.channels();
         let (conductor, form) = match self {
             Self::Channels(form) => (channels, form),
-            Self::Colors => (by_two_colors(&channels), FresnelForm::Simplified),
+            Self::Colors => (by_two_colors(&channels)?, FresnelForm::Simplified),
             Self::Wavelengths => (spectrum.at_wavelengths(WAVELENGTHS), FresnelForm::Exact),
-            Self::Table | Self::Bins(_) => (channels, FresnelForm::Exact),
+            Self::Bins(_) => (channels, FresnelForm::Exact),
         };
         let mut scene = half_pipe();
         if let Some(material) = scene.materials.first_mut() {
@@ -108,13 +101,7 @@ impl Way {
             _ => render(gpu, &scene, options)?.picture,
         };
         let pixels = picture.require(RADIANCE)?.pixels();
-        let pixels: Vec<DVec3> = pixels.map(|pixel| Vec3::from_array(pixel).as_dvec3()).collect();
-        if !matches!(self, Self::Table) {
-            return Ok(pixels);
-        }
-        let columns = by_table(&conductor, options.size[0]);
-        let changed = pixels.iter().zip(columns.iter().cycle());
-        Ok(changed.map(|(pixel, column)| *pixel * *column).collect())
+        Ok(pixels.map(|pixel| Vec3::from_array(pixel).as_dvec3()).collect())
     }
 }
 
@@ -136,33 +123,13 @@ pub fn spectrum_of(metal: &str) -> Result<IndexSpectrum> {
 }
 
 /// The index that an artist would have described by two colours, which hold no more than single precision.
-fn by_two_colors(ior: &ConductorIor) -> ConductorIor {
+///
+/// # Errors
+/// As [`by_colors`]; an index has both colours in range.
+fn by_two_colors(ior: &ConductorIor) -> Result<ConductorIor> {
     let [reflectance, edge_tint] =
         artistic_parameters(ior.eta.as_dvec3(), ior.k.as_dvec3()).map(|color| color.as_vec3());
     by_colors(reflectance, edge_tint)
-}
-
-/// What the table's interpolation multiplies each column of a picture by. No scene can name the table. In a smooth half pipe a ray from above meets all its
-/// reflections at one angle, whose sine is the distance from the middle; from one to the next it goes on by a half turn less twice the angle.
-fn by_table(ior: &ConductorIor, width: u32) -> Vec<DVec3> {
-    let (eta, k) = (ior.eta.as_dvec3(), ior.k.as_dvec3());
-    let factor = |cosine: f64| fresnel_conductor(cosine, eta, k);
-    let table = fresnel_table(factor);
-    let change = |x: f64| {
-        let angle = x.abs().asin();
-        let cosine = angle.cos();
-        let reflections = 1.0 + ((angle + FRAC_PI_2) / (PI - 2.0 * angle)).floor();
-        let looked_up = fresnel_table_lookup(&table, cosine) / simplified_geometry(cosine);
-        (looked_up / factor(cosine)).powf(reflections)
-    };
-    let places = width * TABLE_SAMPLES;
-    let at = |place: u32| f64::from(SEEN) * (2.0 * (f64::from(place) + 0.5) / f64::from(places) - 1.0);
-    (0..width)
-        .map(|column| {
-            let own = column * TABLE_SAMPLES..(column + 1) * TABLE_SAMPLES;
-            own.map(|place| change(at(place))).sum::<DVec3>() / f64::from(TABLE_SAMPLES)
-        })
-        .collect()
 }
 
 /// A half pipe of radius 1 under a white sky, whose one material is a mirror.
@@ -199,18 +166,10 @@ fn half_pipe() -> Scene {
 mod tests {
     use super::*;
 
-    /// Between the table's nodes the interpolated product is off by up to 0.06 %, as often as light is reflected.
     #[test]
-    fn the_table_changes_columns_by_its_interpolation() {
+    fn two_colours_in_single_precision_are_the_index() {
         let ior = metals::by_name("gold").expect("metal");
-        let columns = by_table(&ior, 64);
-        assert_eq!(columns.len(), 64);
-        let off = |column: &DVec3| (*column - DVec3::ONE).abs().max_element();
-        assert!(columns.iter().all(|column| off(column) < 5.0 * 6e-4));
-        assert!(columns.iter().any(|column| off(column) > 1e-5));
-        // The half pipe is the same on both sides.
-        assert!((columns[3] - columns[60]).abs().max_element() < 1e-12);
-        let [before, after] = [ior, by_two_colors(&ior)].map(|ior| [ior.eta, ior.k]);
+        let [before, after] = [ior, by_two_colors(&ior).expect("colours")].map(|ior| [ior.eta, ior.k]);
         for (a, b) in before.iter().zip(&after) {
             assert!((*a - *b).abs().max_element() < 1e-3, "{a} {b}");
         }
