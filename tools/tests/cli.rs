@@ -912,8 +912,10 @@ fn hard_cases_are_listed_judged_and_shown() -> Tested {
     let judged = json(&succeed(&["stability", "empty-scene", "--json"])?.stdout)?;
     let outcomes = judged["outcomes"].as_array().ok_or("no outcomes")?;
     let subjects = judged["subjects"].as_array().ok_or("no subjects")?;
-    // All but the scattering functions, which no scene concerns.
-    assert_eq!(outcomes.len() + 1, subjects.len(), "{judged}");
+    // All but the scattering functions, which no scene concerns, and estimates of media, of which there are none.
+    let of_media = |name: &serde_json::Value| name.as_str().is_some_and(|name| name.starts_with("photon ("));
+    let without = subjects.iter().filter(|name| of_media(name)).count() + 1;
+    assert_eq!(outcomes.len() + without, subjects.len(), "{judged}");
     for outcome in outcomes {
         // Techniques of a part of the light refuse what has another; whatever holds all light passes.
         let subject = outcome["subject"].as_str().ok_or("no subject")?;

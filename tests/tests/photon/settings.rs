@@ -320,13 +320,13 @@ fn what_cannot_be_is_refused_by_name() {
                 other => panic!("{wanted}: {other}"),
             }
         }
-        // A range of bounces beside an expression, and an expression behind a final gather.
+        // A long range of bounces beside an expression, and an expression behind a final gather.
         let gathered = PhotonSettings {
             final_gather: true,
             ..settings("LS+DE")
         };
         for (settings, words) in [
-            (settings("bounces=0..300,L[^S]*E"), "is both"),
+            (settings("bounces=0..50,L[^S]*E"), "counts more bounces"),
             (gathered, "final gather"),
         ] {
             let set = settings.path_set;

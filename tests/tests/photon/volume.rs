@@ -556,6 +556,25 @@ fn expressions_agree_with_the_path_tracer() {
     });
 }
 
+/// Ranges of bounces of some lobes, and one beside an expression.
+#[test]
+fn expressions_that_count_bounces_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let scene = lit_box(medium(2.0, 0.8, Phase::Isotropic));
+        for (set, direct_photons) in [("LV+E", true), ("LVVE", false), ("bounces=2..3,L.*V.*E", false)] {
+            let settings = PhotonSettings {
+                volume_radius: 0.02,
+                radius: 0.05,
+                photons: 1 << 13,
+                direct_photons,
+                ..settings(set)
+            };
+            let found = expect_agreement(gpu, &scene, &settings, [24, 2048], [2.5e-2; 3]);
+            assert!(found.beams.photons > 1000, "{set}");
+        }
+    });
+}
+
 #[test]
 fn direct_photons_and_final_gather_have_the_same_light_in_media() {
     with_gpu(|gpu| {

@@ -11,7 +11,7 @@ use clerestory::techniques::photon_mapping::volume::VolumeKernel;
 use clerestory::techniques::photon_mapping::volume::event::PhotonEvent;
 use clerestory_tests::render::{cuboid, medium};
 use clerestory_tests::with_gpu;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 const PHOTONS: u32 = 1 << 14;
 const IOR: f64 = 1.5;
@@ -158,6 +158,12 @@ fn expect(gpu: &Gpu, scene: &Scene, settings: PhotonSettings, bounce: u32, layer
         }
         let sine = sine_to(layers, off, place.z);
         let f = follow(layers, sine, place.z);
+        // Others have been scattered on a way past the bodies.
+        let out = sine / last.index;
+        let direct = DVec3::new(place.x / off * out, place.y / off * out, f.cos);
+        if event.direction.as_dvec3().dot(direct) < 1.0 - 1e-6 {
+            continue;
+        }
         let across = f.off * f.slope * f.cos * (1.0 - sine * sine).sqrt() / sine;
         let density = f64::from(PHOTONS) / (4.0 * PI) * f.chosen * last.sigma * f.passed / across;
         let radius = 3.0 / density.cbrt();
@@ -203,6 +209,12 @@ fn kernels_behind_glass_are_those_of_refracted_footprints() {
             layer(1.3, 1.0, 0.0),
             layer(4.0, 1.0, 0.7),
         ];
+        expect(gpu, &scene, direct(PHOTONS), 2, &layers, true);
+
+        let mut scene = layered("through a pane in fog");
+        place_fog(&mut scene, 0.7, HALF + 2.0, [-1.0, 4.0]);
+        place(&mut scene, glass(), HALF + 1.0, [0.5, 1.0]);
+        let layers = [layer(0.5, 1.0, 0.7), layer(1.0, IOR, 0.0), layer(4.0, 1.0, 0.7)];
         expect(gpu, &scene, direct(PHOTONS), 2, &layers, true);
 
         let mut scene = layered("within glass");

@@ -58,7 +58,8 @@ fn live_cubes_show_what_octahedra_do() {
             );
         }
         assert!(inside > 1500, "{inside}");
-        assert_eq!(alphas[0], alphas[1]);
+        // The finest level holds what one texel sees; those after it are filtered.
+        assert_eq!(alphas[0][1..], alphas[1][1..]);
         for (level, alpha) in alphas[0].iter().enumerate().skip(1) {
             let [a, b] = [&octahedron, &cube].map(|live| look_up(live, level));
             let worst = a.iter().zip(&b).map(|(a, b)| difference(*a, *b)).fold(0.0, f32::max);

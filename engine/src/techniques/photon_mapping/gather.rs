@@ -100,12 +100,12 @@ impl Gather {
         classes: Option<&PathClasses>,
         (slots, kept): (u32, Buffer),
     ) -> Result<Self> {
-        let set = &settings.path_set;
+        let (min_bounces, max_bounces) = settings.counted_bounces(classes);
         // Photons have been scattered once before they land, and at the point that gathers them.
         let least = if settings.direct_photons { 1 } else { 2 };
         let ask = AskSpec {
             has_path_automaton: eye.has_automaton(),
-            counts_bounces: set.min_bounces() > least || set.max_bounces().is_some(),
+            counts_bounces: min_bounces > least || max_bounces.is_some(),
             of_rays: false,
         };
         let queues = QueueMemory::new(gpu, settings.queue, slots)?;
@@ -186,7 +186,7 @@ impl Gather {
             counters_readback,
             gather_states,
             caustic_states,
-            bounces: [set.min_bounces(), set.max_bounces().unwrap_or(u32::MAX)],
+            bounces: [min_bounces, max_bounces.unwrap_or(u32::MAX)],
             classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
             beam,
             gpu: gpu.clone(),

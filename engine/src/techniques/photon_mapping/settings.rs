@@ -104,7 +104,7 @@ crate::settings! {
     /// Settings of photon mapping.
     pub struct PhotonSettings {
         /// Which light paths the picture contains.
-        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63 | an expression, without a range of bounces";
+        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, up to 63 | an expression";
         /// More give less noise, and less bias with kernels that follow footprints.
         pub photons: u32 = 1 << 16, in 1..=1 << 24, unit "photons per pass";
         /// Kernels of one radius, or of each photon's footprint: disks of its area, ellipses by its principal axes or by its differentials.
@@ -404,6 +404,14 @@ impl PhotonSettings {
         }
     }
 
+    /// The least and the greatest number of bounces that are counted, of paths that no classes part.
+    pub(super) fn counted_bounces(&self, classes: Option<&PathClasses>) -> (u32, Option<u32>) {
+        match classes {
+            Some(_) => (0, None),
+            None => (self.path_set.min_bounces(), self.path_set.max_bounces()),
+        }
+    }
+
     /// Whether the picture has anything of a map.
     pub(super) fn needs_photons(&self) -> bool {
         self.path_set
@@ -414,7 +422,7 @@ impl PhotonSettings {
     /// How an expression's light paths are parted; `None` for a range of bounces. `shares`: eye paths go on in media.
     ///
     /// # Errors
-    /// [`Error::Unsupported`] for an expression beside a range of bounces, behind a final gather, and one that tells too much apart.
+    /// [`Error::Unsupported`] for an expression behind a final gather, beside a long range of bounces, and one that tells too much apart.
     pub(super) fn classes(&self, shares: bool) -> Result<Option<PathClasses>> {
         let (min, max) = (self.path_set.min_bounces(), self.path_set.max_bounces());
         if self.path_set == PathSet::new(min, max, PATH_SET_LOBES)? {
@@ -427,13 +435,12 @@ impl PhotonSettings {
                 self.path_set
             )],
         };
-        if (min, max) != (0, None) {
-            return Err(refuse("is both"));
-        }
         if self.final_gather {
             return Err(refuse("is none that a final gather can part"));
         }
-        PathClasses::new(&self.path_set, self.direct_photons, shares)
+        let set = self.path_set.by_states();
+        let set = set.ok_or_else(|| refuse("counts more bounces than light paths have states"))?;
+        PathClasses::new(&set, self.direct_photons, shares)
             .map(Some)
             .map_err(refuse)
     }

@@ -229,12 +229,13 @@ impl PathSet {
             (Some(one), both) if both.is_none_or(|both| one <= both) => (0, None, &whole),
             _ => (min, max, dfa),
         };
-        let mut set = Self {
-            min_bounces: min,
-            max_bounces: max,
-            ..Self::EMPTY
-        };
-        for (state, (next, accepts)) in kept.next.iter().zip(&kept.accepts).enumerate() {
+        Ok(Self::of_automaton(kept).in_range(min, max))
+    }
+
+    /// The words of an automaton of at most [`PATH_SET_STATES`] states.
+    fn of_automaton(dfa: &Dfa) -> Self {
+        let mut set = Self::EMPTY;
+        for (state, (next, accepts)) in dfa.next.iter().zip(&dfa.accepts).enumerate() {
             set.accepting |= u32::from(*accepts) << state;
             for (s, &after) in next.iter().enumerate().filter(|(_, after)| **after != DEAD) {
                 let shift = PATH_SET_STATE_BITS * s as u32;
@@ -242,7 +243,14 @@ impl PathSet {
                 set.successors[state] |= after << shift;
             }
         }
-        Ok(set)
+        set
+    }
+
+    /// The same paths by states alone, without a range beside them; `None` where that takes more than [`PATH_SET_STATES`].
+    pub(crate) fn by_states(&self) -> Option<Self> {
+        Some(self.whole())
+            .filter(|whole| whole.len() <= STATES)
+            .map(|whole| Self::of_automaton(&whole))
     }
 
     /// The automaton without the range.

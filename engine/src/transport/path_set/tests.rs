@@ -201,6 +201,26 @@ fn the_algebra_holds() {
     assert_eq!(set("LS*DE").intersection(&set("bounces=0..40")).unwrap(), a);
 }
 
+#[test]
+fn ranges_become_states_where_these_suffice() {
+    for text in [
+        "LV+E",
+        "bounces=2..4,lobes=volume",
+        "bounces=1..3,LS*DE",
+        "none",
+        "LS+DE",
+    ] {
+        let given = set(text);
+        let by_states = given.by_states().unwrap();
+        assert_eq!((by_states.min_bounces(), by_states.max_bounces()), (0, None), "{text}");
+        assert!(
+            by_states.is_subset_of(&given) && given.is_subset_of(&by_states),
+            "{text}"
+        );
+    }
+    assert_eq!(set("bounces=0..40,LS*DE").by_states(), None);
+}
+
 /// An expression of the test's own, matched by backtracking.
 #[derive(Debug, Clone)]
 enum Expression {

@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(found("lbvh_retry"), [(1, "CL-LBVH")]);
         assert_eq!(found("RadixSort"), [(1, "PM-B-4")]);
         assert!(found("karras").contains(&(2, "CL-LBVH")));
-        assert_eq!(found("octahedron nothing"), []);
+        assert_eq!(found("octahedron xylophone"), []);
     }
 
     #[test]

@@ -110,7 +110,7 @@ crate::settings! {
         /// Source: J. Liu, F. Liang and W. Wong, "The Multiple-Try Method and Local Optimization in Metropolis Sampling", JASA 95, 2000.
         pub tries: u32 = 4, in 1..=16, unit "tries";
         /// Of metropolis: steps of a chain from a light that it chooses to the next; more make lights less alike.
-        pub mutations: u32 = 32, in 1..=64, unit "steps";
+        pub mutations: u32 = 64, in 1..=256, unit "steps";
         /// Of metropolis: pixels at which the power is measured that a chosen light sends to the picture, by a ray each.
         pub power_pixels: u32 = 1024, in 16..=4096, unit "pixels";
         /// Along a side of each view of a light, of which a point light has six; a power of two.

@@ -168,6 +168,7 @@ impl Beam {
             floor,
         } = asking;
         let profile = scene.profile();
+        let (min_bounces, max_bounces) = settings.counted_bounces(classes);
         let queue = AskSpec {
             has_path_automaton: eye.has_automaton(),
             counts_bounces,
@@ -270,10 +271,7 @@ impl Beam {
             counters_readback: gpu.buffer(&BufferDesc::readback("beam counters", bytes))?,
             states: surface_states | volume_states,
             volume_states,
-            bounces: [
-                settings.path_set.min_bounces(),
-                settings.path_set.max_bounces().unwrap_or(u32::MAX),
-            ],
+            bounces: [min_bounces, max_bounces.unwrap_or(u32::MAX)],
             photons: settings.photons,
             classes: classes.map_or([0; ASKING_STATES], |classes| classes.asks),
         })

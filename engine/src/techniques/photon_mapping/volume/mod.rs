@@ -284,7 +284,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/planes.rs::errors_of_planes_fall_with_the_root_of_passes",
             "tests/tests/photon/volume_extremes.rs::planes_stay_finite",
             "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_planes",
-            "tests/tests/photon/volume_extremes.rs::planes_agree_with_the_path_tracer_where_phase_functions_are_narrow",
+            "tests/tests/photon/volume_extremes.rs::planes_agree_with_the_path_tracer_whichever_way_phase_functions_point",
             "tests/tests/twins/photons.rs::planes_agree_with_their_twins",
         ],
         settings: &["volume"],
@@ -407,7 +407,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "PM-SYS-2",
-        name: "photon mapping of participating media as a whole: photons through media, kernels from footprints, a compact map, queries along rays, a moving light",
+        name: "light in participating media as a whole: photons through media, kernels from footprints, a compact map, queries along rays, a moving light",
         role: Role::PartOf("PM-SYS-1"),
         limits: "Photons, map and kernels are made anew for each frame; the source's queries by packets are a setting.",
         sources: &[sources::FABIANOWSKI_2011.at("§7.5")],

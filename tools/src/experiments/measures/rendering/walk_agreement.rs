@@ -23,20 +23,21 @@ use crate::experiments::slope::Fit;
 use crate::experiments::unbiased;
 use crate::experiments::watch::render;
 
-/// Rooms, halls and closed forms, with lamps, points, spots, suns and skies. None has light that a path from the eye cannot find.
-const SCENES: [&str; 12] = [
-    SPHERE,
-    "builtin:cornell-box",
-    "builtin:cornell-box?source=point",
-    "builtin:cornell-box?source=spot",
-    "builtin:cornell-box?sphere=gold&boxes=tall",
-    "builtin:furnace-box?rho=0.5",
-    "builtin:sphere-light?rho=0.7&light=area&radius=0.3",
-    "builtin:passage",
-    "builtin:box-room",
-    "builtin:shaded-lamp",
-    "builtin:atrium",
-    "builtin:conference",
+/// Rooms, halls and closed forms, with lamps, points, spots, suns and skies, and walks of a pass of virtual lights: more where few of them come to what is seen. None has light that a path from
+/// the eye cannot find.
+const SCENES: [(&str, u32); 12] = [
+    (SPHERE, WALKS),
+    ("builtin:cornell-box", WALKS),
+    ("builtin:cornell-box?source=point", WALKS),
+    ("builtin:cornell-box?source=spot", WALKS),
+    ("builtin:cornell-box?sphere=gold&boxes=tall", WALKS),
+    ("builtin:furnace-box?rho=0.5", WALKS),
+    ("builtin:sphere-light?rho=0.7&light=area&radius=0.3", WALKS),
+    ("builtin:passage", 8 * WALKS),
+    ("builtin:box-room", WALKS),
+    ("builtin:shaded-lamp", WALKS),
+    ("builtin:atrium", WALKS),
+    ("builtin:conference", WALKS),
 ];
 /// Where no virtual light is nearer than another to what it lights, so that none needs a bound.
 const SPHERE: &str = "builtin:sphere-light?rho=0.5&frequency=12";
@@ -45,8 +46,10 @@ const FEW_SCENES: usize = 1;
 
 /// What virtual lights light, and what bidirectional paths do but for lamps in view, whose outlines are rare and bright in pixels that they barely touch.
 const PATHS: [&str; 2] = ["!L.*S[DG]S*E", "bounces=1.."];
-/// Walks of a pass of virtual lights.
-const WALKS: u32 = 32;
+/// Lamps in view: means are those of the pixels that see them, or none, all over.
+const LAMPS: &str = "emitted";
+/// Walks of a pass of virtual lights, unless the scene says otherwise. Pixels share them, so that more of them do more for means than more pixels.
+const WALKS: u32 = 512;
 /// Bounds of the geometry term over the one that is chosen by area and walks, three decades.
 const BOUNDS: [(&str, f64); 3] = [
     ("virtual lights, a bound of 0.03", 0.03),
@@ -57,12 +60,35 @@ const UNBOUNDED: &str = "virtual lights, no bound";
 const CUTS: &str = "virtual lights, cuts of 16";
 const BIDIRECTIONAL: &str = "bidirectional paths";
 
-/// Side of pictures, pictures of each budget, samples per pixel of references.
-const WORK: [(u32, u32, u32); 2] = [(24, 16, 65_536), (8, 2, 256)];
-/// Samples per pixel; the same of a smoke run.
-const BUDGETS: [&[u32]; 2] = [&[4, 16, 64], &[1, 4]];
+const FULL: Form = Form {
+    sides: [16, 64],
+    repeats: 32,
+    reference: [65_536, 16_384],
+    lamps: 256,
+    budgets: &[1, 4, 16],
+};
+const SMOKE: Form = Form {
+    sides: [8, 8],
+    repeats: 2,
+    reference: [256, 256],
+    lamps: 16,
+    budgets: &[1, 4],
+};
 /// The reference's seed; pictures have those after it.
 const SEED: u32 = 1;
+
+#[derive(Clone, Copy)]
+struct Form {
+    /// Pixels along a side, by [`PATHS`].
+    sides: [u32; 2],
+    /// Pictures of each budget.
+    repeats: u32,
+    /// Samples per pixel of references, by [`PATHS`], and of the pictures that say where lamps are in view.
+    reference: [u32; 2],
+    lamps: u32,
+    /// Samples per pixel.
+    budgets: &'static [u32],
+}
 
 rows! {
     /// A technique with its settings in a scene.
@@ -103,9 +129,9 @@ const CRITERIA: &[Criterion<Row>] = &[
 impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let gpu = (context.gpu)()?;
-        let name = |address: &&str| short_name(address).to_owned();
-        let rows = context.each_kept(&gpu, context.first(&SCENES, FEW_SCENES), name, |address| {
-            of_scene(context, &gpu, address)
+        let name = |(address, _): &(&str, u32)| short_name(address).to_owned();
+        let rows = context.each_kept(&gpu, context.first(&SCENES, FEW_SCENES), name, |case| {
+            of_scene(context, &gpu, *case)
         })?;
         Ok(Self { rows })
     }
@@ -115,8 +141,8 @@ impl Study for Found {
         Findings::of(&self.rows, CRITERIA)
             .headline("greatest difference of a mean, relative", worst.map(Measured::exact))
             .note(
-                "Bounds are those of the geometry term over walks / area. z-tests are of the means of all pictures of the most samples. Means and slopes lie within their intervals with \
-                 a probability of 95 %, by the jackknife over the pictures of a budget. Errors that cannot be told from the reference's own have no slope: in the sphere, where all lights bring \
+                "Bounds are those of the geometry term over walks / area. z-tests are of the means of all pictures of the most samples. Means are those of pixels without the outline of a lamp. They and \
+                 slopes lie within their intervals with a probability of 95 %, by the jackknife over the pictures of a budget. Errors that cannot be told from the reference's own have no slope: in the sphere, where all lights bring \
                  the same, those without a bound.",
             )
     }
@@ -132,13 +158,14 @@ struct Variant {
 }
 
 /// All of a scene whose surfaces have that area, m².
-fn variants(address: &str, area: f64) -> Vec<Variant> {
+fn variants((address, walks): (&str, u32), area: f64) -> Vec<Variant> {
+    let density = f64::from(walks) / area;
     let lights = |name, bound, bound_value: f64, selection| Variant {
         name,
         technique: "vpl",
         paths: 0,
         settings: VirtualLightSettings {
-            walks: WALKS,
+            walks,
             bound,
             bound_value: bound_value as f32,
             selection,
@@ -148,14 +175,7 @@ fn variants(address: &str, area: f64) -> Vec<Variant> {
         }
         .into(),
     };
-    let bounded = BOUNDS.map(|(name, factor)| {
-        lights(
-            name,
-            EdgeBound::Geometry,
-            factor * f64::from(WALKS) / area,
-            Selection::All,
-        )
-    });
+    let bounded = BOUNDS.map(|(name, factor)| lights(name, EdgeBound::Geometry, factor * density, Selection::All));
     let unbounded = (address == SPHERE).then(|| lights(UNBOUNDED, EdgeBound::None, 0.0, Selection::All));
     let bidirectional = Variant {
         name: BIDIRECTIONAL,
@@ -169,48 +189,53 @@ fn variants(address: &str, area: f64) -> Vec<Variant> {
         }
         .into(),
     };
-    let cuts = lights(CUTS, EdgeBound::Geometry, f64::from(WALKS) / area, Selection::Cuts);
+    let cuts = lights(CUTS, EdgeBound::Geometry, density, Selection::Cuts);
     let all = bounded.into_iter().chain(unbounded);
     all.chain([cuts, bidirectional]).collect()
 }
 
 /// How many pictures are tested in all: each scene's, and one more in the sphere.
 fn family() -> usize {
-    SCENES.iter().map(|address| variants(address, 1.0).len()).sum()
+    SCENES.iter().map(|case| variants(*case, 1.0).len()).sum()
 }
 
-fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>> {
-    let (side, repeats, of_reference) = context.pick(WORK[0], WORK[1]);
-    let budgets = context.pick(BUDGETS[0], BUDGETS[1]);
+fn of_scene(context: &Context<'_>, gpu: &Gpu, case: (&str, u32)) -> Result<Vec<Row>> {
+    let (address, _) = case;
+    let form = context.pick(FULL, SMOKE);
     let renderer = Renderer::new(gpu, &scene::load(address)?)?;
-    let picture = |technique: &str, settings: &Settings, spp: u32, seed: u32| -> Result<Option<Picture>> {
-        let options = RenderOptions {
-            technique: Some(technique.into()),
-            size: [side; 2],
-            spp,
-            seed,
-            settings: settings.clone(),
-            ..RenderOptions::default()
+    let picture =
+        |technique: &str, paths: usize, settings: &Settings, spp: u32, seed: u32| -> Result<Option<Picture>> {
+            let options = RenderOptions {
+                technique: Some(technique.into()),
+                size: [form.sides[paths]; 2],
+                spp,
+                seed,
+                settings: settings.clone(),
+                ..RenderOptions::default()
+            };
+            let rendered = render(&renderer, &options, context.watch)?;
+            Ok(rendered.map(|rendered| rendered.picture))
         };
-        let rendered = render(&renderer, &options, context.watch)?;
-        Ok(rendered.map(|rendered| rendered.picture))
+    let traced = |paths: usize, set: &str, spp: u32| {
+        let settings: Settings = json!({ "sampler": "pcg", "path_set": set }).into();
+        picture("path", paths, &settings, spp, SEED)
     };
     let mut references = Vec::new();
-    for paths in PATHS {
-        let settings: Settings = json!({ "sampler": "pcg", "path_set": paths }).into();
-        let Some(reference) = picture("path", &settings, of_reference, SEED)? else {
+    for (paths, set) in PATHS.iter().enumerate() {
+        let reference = traced(paths, set, form.reference[paths])?;
+        let (Some(reference), Some(lamps)) = (reference, traced(paths, LAMPS, form.lamps)?) else {
             return Ok(Vec::new());
         };
-        references.push(reference);
+        references.push(Reference::new(reference, &lamps)?);
     }
     let mut rows = Vec::new();
-    for variant in variants(address, renderer.gpu_scene().surface_area()) {
+    for variant in variants(case, renderer.gpu_scene().surface_area()) {
         let mut pictures = Vec::new();
-        for (index, spp) in budgets.iter().enumerate() {
+        for (index, spp) in form.budgets.iter().enumerate() {
             let mut of_budget = Vec::new();
-            for repeat in 0..repeats {
-                let seed = SEED + 1 + index as u32 * repeats + repeat;
-                let Some(picture) = picture(variant.technique, &variant.settings, *spp, seed)? else {
+            for repeat in 0..form.repeats {
+                let seed = SEED + 1 + index as u32 * form.repeats + repeat;
+                let Some(picture) = picture(variant.technique, variant.paths, &variant.settings, *spp, seed)? else {
                     return Ok(Vec::new());
                 };
                 of_budget.push(picture);
@@ -220,7 +245,7 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>>
         rows.push(row(
             address,
             variant.name,
-            budgets,
+            form.budgets,
             &pictures,
             &references[variant.paths],
         )?);
@@ -228,23 +253,55 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, address: &str) -> Result<Vec<Row>>
     Ok(rows)
 }
 
+/// The path tracer's picture.
+struct Reference {
+    picture: Picture,
+    /// Of each value, whether its pixel has no outline of a lamp, which would be most of its noise.
+    counts: Vec<bool>,
+}
+
+impl Reference {
+    fn new(picture: Picture, lamps: &Picture) -> Result<Self> {
+        let values = lamps.main_layer()?.values().iter();
+        let even = |(value, variance): (&f32, &f32)| *variance <= f32::EPSILON * value * value;
+        let counts = values.zip(lamps.require(VARIANCE)?.values()).map(even).collect();
+        Ok(Self { picture, counts })
+    }
+
+    /// The mean of the values that count; 0 of none.
+    fn mean(&self, values: &[f32]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0);
+        for (value, _) in values.iter().zip(&self.counts).filter(|(_, counts)| **counts) {
+            (sum, count) = (sum + f64::from(*value), count + 1);
+        }
+        sum / f64::from(count.max(1))
+    }
+}
+
 /// What pictures by budget and repeat say against a reference.
-fn row(address: &str, technique: &str, budgets: &[u32], pictures: &[Vec<Picture>], reference: &Picture) -> Result<Row> {
-    let (values, variance) = (reference.main_layer()?.values(), reference.require(VARIANCE)?.values());
+fn row(
+    address: &str,
+    technique: &str,
+    budgets: &[u32],
+    pictures: &[Vec<Picture>],
+    reference: &Reference,
+) -> Result<Row> {
+    let picture = &reference.picture;
+    let (values, variance) = (picture.main_layer()?.values(), picture.require(VARIANCE)?.values());
     let most = pictures.last().map_or(&[][..], Vec::as_slice);
     let (together, of_together) = mean_of(most)?;
     let alpha = sidak_threshold(SIGNIFICANCE, family());
     let test = z_test(&together, &of_together, values, variance, alpha)?;
 
-    let mean = |values: &[f32]| values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len() as f64;
-    let expected = mean(values);
+    let expected = reference.mean(values);
+    let count = reference.counts.iter().filter(|counts| **counts).count().max(1);
     // Channels of a pixel may be one and the same.
-    let noise = (3.0 * variance.iter().map(|value| f64::from(*value)).sum::<f64>()).sqrt() / values.len() as f64;
+    let noise = (3.0 * reference.mean(variance) / count as f64).sqrt();
     let mut differences = Vec::new();
     for repeat in 0..most.len() {
         let (mut sum, mut samples) = (0.0, 0.0);
         for (of_budget, spp) in pictures.iter().zip(budgets) {
-            sum += f64::from(*spp) * mean(of_budget[repeat].main_layer()?.values());
+            sum += f64::from(*spp) * reference.mean(of_budget[repeat].main_layer()?.values());
             samples += f64::from(*spp);
         }
         differences.push(sum / samples / expected - 1.0);
@@ -256,7 +313,7 @@ fn row(address: &str, technique: &str, budgets: &[u32], pictures: &[Vec<Picture>
     for of_budget in pictures {
         let found: Vec<_> = of_budget
             .iter()
-            .map(|picture| unbiased::measure(picture, reference))
+            .map(|found| unbiased::measure(found, picture))
             .collect::<Result<_>>()?;
         of_reference = found
             .iter()

@@ -1,6 +1,6 @@
 //! A body that moves under kept virtual lights whose lamp stands still: it receives their light, and they stay where they are.
 //!
-//! Source: S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR 2007, whose dynamic objects receive light alone. Oracle: frames of many more new lights.
+//! Source: S. Laine et al., "Incremental Instant Radiosity for Real-Time Indirect Illumination", EGSR 2007, whose dynamic objects receive light alone. Oracle: the path tracer.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use clerestory::{Error, Result};
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::vpl_incremental::{
-    Form, INDIRECT, ORACLE_SEED, RENEWED, SCENES, Subject, difference, frame, renderer, side_by_side,
+    Form, INDIRECT, ORACLE_SEED, RENEWED, SCENES, Subject, difference, frame, oracle, renderer, side_by_side, traced,
 };
 use crate::experiments::findings::{Bound, Criterion, Findings, Repeats, rows};
 use crate::experiments::measures::pictures::Panel;
@@ -68,9 +68,9 @@ pub(super) fn measure(gpu: &Gpu, form: Form) -> Result<(Receiver, Vec<Panel>)> {
         .position(|instance| instance.name == BODY);
     let body = body.ok_or_else(|| Error::scene(SCENE, BODY, "is not there"))?;
     let scene = Arc::new(GpuScene::new(gpu, &subject.scene)?);
-    let by = |placement, lights| {
+    let by = |placement| {
         let settings = ManyLightSettings {
-            lights,
+            lights: form.lights,
             placement,
             visibility: Visibility::Rays,
             renewed: RENEWED,
@@ -79,9 +79,9 @@ pub(super) fn measure(gpu: &Gpu, form: Form) -> Result<(Receiver, Vec<Panel>)> {
         };
         renderer(gpu, &scene, &subject, settings, form)
     };
-    let mut kept = by(Placement::Incremental, form.lights)?;
-    let mut new = by(Placement::Walks, form.lights)?;
-    let mut oracle = by(Placement::Walks, form.oracle)?;
+    let mut kept = by(Placement::Incremental)?;
+    let mut new = by(Placement::Walks)?;
+    let mut oracle = oracle(gpu, &scene, &subject, form)?;
     let (mut of_kept, mut of_new, mut panels) = (Vec::new(), Vec::new(), Vec::new());
     // The first frame places all lights.
     let mut placed = 0;
@@ -93,7 +93,7 @@ pub(super) fn measure(gpu: &Gpu, form: Form) -> Result<(Receiver, Vec<Panel>)> {
         if number == 0 {
             placed = kept.counts().renewed;
         } else if number % form.every == 0 {
-            let (truth, _) = frame(&mut oracle, &subject, Some(ORACLE_SEED + number))?;
+            let truth = traced(&mut oracle, form, ORACLE_SEED + number)?;
             let (by_new, _) = frame(&mut new, &subject, Some(number))?;
             of_kept.push(difference(&by_kept, &truth));
             of_new.push(difference(&by_new, &truth));
