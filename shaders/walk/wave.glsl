@@ -71,12 +71,12 @@ struct WalkKey {
 
 struct WalkState {
     vec3 origin;      // of the ray under way
-    float eta_scale;  // undoes the radiance scaling of refractions for Russian roulette
+    float eta_scale;  // undoes the radiance scaling of refractions for Russian roulette. Of photons instead their number (EVEN_SURVIVAL), or what they come from (PHOTON_FROM_...)
     vec3 direction;   // unit
     uint bounce;      // scattering events so far
     vec3 throughput;
     float pdf;        // of the direction, solid angle; 0 after a delta lobe or at the start: emission then counts in full. Of photons instead the squared distance of
-                      // their light, m2 (CARRIES_LIGHT_DISTANCE), or what they come from (PHOTON_FROM_...)
+                      // their light, m2 (CARRIES_LIGHT_DISTANCE)
 };
 
 struct GatheredLight {

@@ -142,7 +142,7 @@ void main() {
         uvec4 q0;
         uvec4 q1;
         uvec4 q2;
-        pack_plane(PhotonPlane(in3(0u), in3(3u), in3(6u), in3(9u), in_bits(12u), in_bits(13u)), q0, q1, q2);
+        pack_plane(PhotonPlane(in3(0u), in3(3u), in3(6u), in3(9u), in_bits(12u), in_bits(13u), in1(26u)), q0, q1, q2);
         PhotonPlane p = unpack_plane(q0, q1, q2);
         out_bits(0u, q0.w);
         out_bits(1u, q1.w);
@@ -157,6 +157,7 @@ void main() {
         out1(11u, at.jacobian);
         out1(12u, least_extinction(in3(20u)));
         out1(13u, plane_extinction(in3(23u), in3(20u)));
+        out1(14u, p.light);
         break;
     }
     case 10u: {  // shares of photons and of eye paths
@@ -166,6 +167,9 @@ void main() {
         out1(2u, photon_share(in1(12u), even2));
         out1(3u, placeless_distance2(in3(0u), in3(3u)));
         out1(4u, carried_distance2(in1(13u), in_bits(14u), in1(15u), in_bits(16u) != 0u));
+        out1(5u, even_distance2_across(across_of_planes(in1(7u), in1(8u)), in1(6u), in1(10u)));
+        out1(6u, evened_distance2(in1(12u), in1(6u)));
+        out1(7u, distance2_in_plane(in1(17u), in1(15u), in1(6u)));
         break;
     }
     case 12u: {  // extinction along short beams

@@ -12,23 +12,42 @@
 //! ray has the share of its own way: that blurs as its light does, and fades as kernels shrink. Eye paths do not find light that a mirror
 //! scatters first, and light that no photon carries is theirs alone: that d² is 0, or not asked for. The distance d makes up for the 1/d² of light samples next to lights, whose variance has no bound.
 //!
+//! Photons that are seen by planes, of two flights in the directions ω₁ and ω₂ where a ray in the direction v meets them, come so with the density n J τ …, J = |v · (ω₁ × ω₂)|: J / σ² stands for the area
+//! of a kernel. The share of planes is J / (J + c) with c = 16 π² σ² p(xₖ) d² / n, which makes up for the 1/J of their light: however nearly parallel flights and ray are, what one plane brings is bounded as
+//! a light sample is that stands for as many photons, and by nothing that a narrow phase function has at xₖ. Nor is x₁ taken to scatter evenly there: where it lies in a medium d² stands over 4 π times the
+//! density with which light is scattered ([`evened_distance2`]), of planes and of the beams beside them.
+//!
 //! Sources: J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014, whose weights take whole densities; E. Veach, "Robust Monte Carlo Methods for
 //! Light Transport Simulation", 1997, 9.2.2. Units: m, m⁻¹, m². Scaling lengths changes no share. Twin of `transport/photon_share.glsl`.
 
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Squared distance of a light, m², at which eye paths and photons each have half of its light.
+/// What stands for the area of a kernel in the density with which photons are seen, m², of beams that pass a ray within a radius, m, at an angle of this sine, in a medium of a mean extinction, m⁻¹.
+pub fn across_of_beams(sine: f64, extinction: f64, radius: f64) -> f64 {
+    2.0 * radius * sine / extinction
+}
+
+/// The same of planes, of which two flights and the ray, of unit length, span a box of this volume.
+pub fn across_of_planes(jacobian: f64, extinction: f64) -> f64 {
+    jacobian / (extinction * extinction)
+}
+
+/// Squared distance of a light, m², at which eye paths and so many photons of a pass, which are seen across an area, m², each have half of its light. `phase`: density of the phase function, sr⁻¹.
+pub fn even_distance2_across(across: f64, phase: f64, photons: f64) -> f64 {
+    photons * across / (16.0 * PI * PI * phase)
+}
+
+/// The same of photons that are seen as collisions and, with `has_beams`, as beams.
 ///
-/// `phase`: density of the phase function, sr⁻¹; `sine`: of the angle between both directions at the eye path's first scattering; `extinction`: mean over bands, m⁻¹; `radius`: of kernels, m;
-/// `photons`: of a pass, which are seen there as collisions and, with `has_beams`, as beams.
+/// `sine`: of the angle between both directions at the eye path's first scattering; `extinction`: mean over bands, m⁻¹; `radius`: of kernels, m.
 pub fn even_distance2(phase: f64, sine: f64, extinction: f64, radius: f64, photons: f64, has_beams: bool) -> f64 {
     let of_beams = if has_beams {
-        2.0 * radius * sine / extinction
+        across_of_beams(sine, extinction, radius)
     } else {
         0.0
     };
-    photons * (PI * radius * radius + of_beams) / (16.0 * PI * PI * phase)
+    even_distance2_across(PI * radius * radius + of_beams, phase, photons)
 }
 
 /// Share of eye paths in light whose squared distance from its first scattering is `light2`, m², in \[0, 1\].
@@ -66,10 +85,27 @@ pub fn carried_distance2(carried: f64, bounce: u32, way: f64, rough: bool) -> f6
     }
 }
 
+/// Squared distance of light, m², as it would be of one that a medium scatters first evenly, and not with this density, sr⁻¹.
+pub fn evened_distance2(light2: f64, phase: f64) -> f64 {
+    light2 / (4.0 * PI * phase)
+}
+
+/// That of a plane's light, by what its record tells: the distance itself, m²; or, below 0, where the scattering between both flights is the first one, of this density, minus how far the light is from
+/// the first flight's beginning, m, that is `along` before the scattering.
+pub fn distance2_in_plane(told: f64, along: f64, phase: f64) -> f64 {
+    if told < 0.0 {
+        evened_distance2((along - told).powi(2), phase)
+    } else {
+        told
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Phase;
     use crate::test_random::Random;
+    use crate::transport::phase::phase_function;
 
     fn place(random: &mut Random) -> DVec3 {
         random.vector().as_dvec3() * 2.0
@@ -147,6 +183,79 @@ mod tests {
                 assert!((ratio - 1.0).abs() < 1e-9, "{scatterings} scatterings: {ratio}");
             }
         }
+    }
+
+    /// The same of planes, whatever phase functions are.
+    #[test]
+    fn planes_share_by_densities_of_narrow_phase_functions() {
+        let mut random = Random(9);
+        for round in 0..400 {
+            let last = 2 + round % 4;
+            let phase = Phase::HenyeyGreenstein {
+                g: 0.95 * random.signed(),
+            };
+            let extinction = f64::from(random.magnitude(-4, 3));
+            let photons = f64::from(random.magnitude(0, 20));
+            // From the light on: its place, those of the scatterings, and the eye's.
+            let places: Vec<DVec3> = (0..last + 2).map(|_| place(&mut random)).collect();
+            let way = |a: usize, b: usize| (places[b] - places[a]).normalize();
+            let passed = |a: usize, b: usize| (-extinction * places[a].distance(places[b])).exp();
+            // Light leaves its own place evenly.
+            let turn = |i: usize| match i {
+                0 => 1.0 / (4.0 * PI),
+                _ => phase_function(phase, way(i - 1, i), way(i, i + 1)),
+            };
+            // Of flights that come as far, by area across them.
+            let flight = |a: usize, b: usize| passed(a, b) / places[a].distance_squared(places[b]);
+            let by_eye: f64 = extinction
+                * passed(last + 1, last)
+                * (1..last)
+                    .map(|i| turn(i + 1) * extinction * flight(i + 1, i))
+                    .product::<f64>();
+            let before: f64 = photons
+                * (0..last - 2)
+                    .map(|i| turn(i) * extinction * flight(i, i + 1))
+                    .product::<f64>();
+            // Both flights of a plane come farther than where the ray meets it, in directions that the photon has been scattered into.
+            let volume = way(last, last + 1)
+                .dot(way(last - 2, last - 1).cross(way(last - 1, last)))
+                .abs();
+            let flights = turn(last - 2) * flight(last - 2, last - 1) * turn(last - 1) * flight(last - 1, last);
+            let by_planes = before * flights * volume;
+            let even2 = even_distance2_across(across_of_planes(volume, extinction), turn(last), photons);
+            let light2 = evened_distance2(places[0].distance_squared(places[1]), turn(1));
+            let left_out = passed(last + 1, last) / passed(0, 1);
+            let ratio = by_eye / by_planes / (light2 / even2 * left_out);
+            assert!((ratio - 1.0).abs() < 1e-9, "{last} scatterings: {ratio}");
+            // A plane tells as much, of a light that its first flight may begin behind.
+            let told = if last == 2 {
+                -0.25 * places[0].distance(places[1])
+            } else {
+                light2
+            };
+            let along = 0.75 * places[last - 2].distance(places[last - 1]);
+            let of_plane = distance2_in_plane(told, along, turn(last - 1));
+            assert!((of_plane / light2 - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn shares_of_planes_make_up_for_their_volume() {
+        let (phase, extinction, photons, light2) = (0.3, 2.0, 1e4, 0.7);
+        let share = |volume: f64| {
+            let even2 = even_distance2_across(across_of_planes(volume, extinction), phase, photons);
+            assert!((eye_share(light2, even2) + photon_share(light2, even2) - 1.0).abs() < 1e-15);
+            photon_share(light2, even2)
+        };
+        // What a plane brings goes with the share over the volume.
+        let bound = photons / (16.0 * PI * PI * extinction * extinction * phase * light2);
+        let volumes = (0..100).map(|i| 10f64.powf(-0.1 * f64::from(i)));
+        let weights: Vec<f64> = volumes.map(|volume| share(volume) / volume).collect();
+        assert!(weights.is_sorted() && weights.iter().all(|weight| *weight < bound));
+        assert!((weights[99] / bound - 1.0).abs() < 1e-6, "the bound is met");
+        assert!(share(1.0) > 0.9 && share(0.0) == 0.0);
+        // No distance leaves all to photons.
+        assert_eq!(photon_share(distance2_in_plane(0.0, 1.0, phase), 0.0), 1.0);
     }
 
     #[test]

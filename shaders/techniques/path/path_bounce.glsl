@@ -10,6 +10,8 @@ layout(constant_id = 28) const bool NUMBERED = false;  // each slot has a pixel 
 // Photons of a pass that have a share of the light that paths scatter further behind their first scattering in a medium (transport/photon_share.glsl); 0: none has.
 layout(constant_id = 50) const uint SHARING_PHOTONS = 0u;
 const bool SHARES = SHARING_PHOTONS != 0u;
+// These have planes: paths share the light of planes by the areas that stand for these, and all other by those of beams.
+layout(constant_id = 51) const bool SHARES_PLANES = false;
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -21,7 +23,7 @@ layout(push_constant, scalar) uniform Push {
     uint surrounding;       // index of the medium outside all bodies, or NO_MEDIUM
     uint accepting;         // states of the automaton in which light counts, a bit each
     uint successors[15];    // of each state
-    float edge_bound;       // of EDGE_BOUND, beyond which paths have the light of an edge
+    float edge_bound;       // of EDGE_BOUND, beyond which paths have the light of an edge; of SHARES_PLANES, beside which no edge is bounded, the share of ways that have planes
     float photon_radius;    // of SHARES, within which photons are seen
 } push;
 

@@ -6,7 +6,8 @@
 // sources in transport/medium.glsl and transport/media_tracking.glsl. Emission of homogeneous media is integrated along the way in closed
 // form, that of grids is collected at tentative collisions. Light of points, spots and points of area lights is also sampled equi-angularly
 // where that helps, combined by the power heuristic. Unbiased. Light from infinity does not pass an endless medium that extinguishes.
-// Where photons have the same light (SHARES), paths have the rest of what is scattered more than once, the last time, from the light on, here.
+// Where photons have the same light (SHARES), paths have the rest of what is scattered more than once, the last time, from the light on, here; of what is scattered twice at last on one
+// way through a body what planes leave, if there are some (SHARES_PLANES).
 // Where other means have the light of edges between two scatterings up to a bound, collisions scatter what it leaves out, as surfaces do.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -34,11 +35,46 @@ layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // equi-angular sample
 #include "transport/bodies.glsl"
 #include "transport/phase.glsl"
 
-// The entry of path_even_distances of the path under way.
+// The entries of path_even_distances and path_flights of the path under way.
 float path_even_distance2 = 0.0;
+PathFlight path_flight = PathFlight(vec3(0.0), 1.0);
 
-// Share of the path in light from that squared distance that it scatters at a place of its way.
-float share_here(float light2) { return path_even_distance2 != 0.0 ? eye_share(light2, abs(path_even_distance2)) : 1.0; }
+// Squared distance of a light at which the path and photons each have half of what a place on its way scatters out of a direction.
+float even_distance2_here(WalkState path, SceneMedium m, vec3 from) {
+    // Photons come by the place, along the path's way and on towards the eye, with the path's own density where its way began: by a plane, if nothing but the medium is in between.
+    bool by_plane = SHARES_PLANES && path_even_distance2 < 0.0 && path_flight.crossing != vec3(0.0);
+    if (!by_plane) {
+        return abs(path_even_distance2);
+    }
+    float across = across_of_planes(abs(dot(path_flight.crossing, from)), mean_extinction(m.sigma_t));
+    // Never 0, which stands for paths that share nothing.
+    return max(even_distance2_across(across, path.pdf, float(SHARING_PHOTONS) * push.edge_bound), NORMAL_MIN);
+}
+
+// Share of the path in light from that squared distance and direction that it scatters at a place of its way with a density.
+float share_here(WalkState path, SceneMedium m, float phase, float light2, vec3 from) {
+    if (path_even_distance2 == 0.0) {
+        return 1.0;
+    }
+    return eye_share(SHARES_PLANES ? evened_distance2(light2, phase) : light2, even_distance2_here(path, m, from));
+}
+
+// Notes for what is found behind that the path is scattered into a direction with a density.
+void note_scattering(WalkState path, SceneMedium m, vec3 wi, float phase) {
+    vec3 crossing = cross(path.direction, wi);
+    if (path_even_distance2 != 0.0) {
+        path_even_distance2 = even_distance2_here(path, m, wi);
+    } else if (SHARES_PLANES) {
+        float across = across_of_beams(length(crossing), mean_extinction(m.sigma_t), push.photon_radius);
+        path_even_distance2 = -max(even_distance2_across(across, phase, float(SHARING_PHOTONS)), NORMAL_MIN);
+        path_flight.crossing = crossing;
+    } else {
+        bool has_beams = !(HAS_GRIDS && m.has_grid != 0u);
+        path_even_distance2 =
+            -even_distance2(phase, length(crossing), mean_extinction(m.sigma_t), push.photon_radius, float(SHARING_PHOTONS), has_beams);
+    }
+    path_flight.evenness = 4.0 * PI * phase;
+}
 
 // As in path_shade.comp.
 layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
@@ -156,7 +192,7 @@ bool sample_airlight(uint slot, uint place, WalkState path, vec3 bands, SceneMed
     float weight = light_weight(gain * seen.pdf, phase) * power_heuristic(pdf, gain * reckoned_collision_density(m, bands, t, walk));
     if (SHARES) {
         vec3 to = seen.point.position - from;
-        weight *= share_here(dot(to, to));
+        weight *= share_here(path, m, phase, dot(to, to), seen.direction);
     }
     vec3 contribution = path.throughput * passed * scattered * seen.radiance * (phase * weight / pdf);
     if (EDGE_BOUND != EDGE_UNBOUNDED) {
@@ -191,7 +227,8 @@ uint sample_collision_light(uint slot, uint place, WalkState path, vec3 bands, S
     }
     if (SHARES) {
         vec3 to = light.point.position - from;
-        weight *= share_here(light.infinite ? placeless_distance2(push.scene_lower, push.scene_upper) : dot(to, to));
+        float light2 = light.infinite ? placeless_distance2(push.scene_lower, push.scene_upper) : dot(to, to);
+        weight *= share_here(path, m, phase, light2, light.direction);
     }
     ShadowRay ray = shadow_ray(slot, path, from, light.point.position, path.throughput * light.radiance * (phase * weight));
     if (light.infinite) {
@@ -209,13 +246,11 @@ bool scatter(uint slot, SceneMedium m, vec3 at, inout WalkState path) {
     vec2 u = bounce_sample(slot, path.bounce, DIMENSION_DIRECTION);
     float c = phase_function_sample(m.phase, m.phase_parameter, u.x);
     vec3 wi = normalize(phase_direction(path.direction, c, u.y));
-    path.pdf = phase_function(m.phase, m.phase_parameter, path.direction, wi);
+    float phase = phase_function(m.phase, m.phase_parameter, path.direction, wi);
     if (SHARES) {
-        bool has_beams = !(HAS_GRIDS && m.has_grid != 0u);
-        float sine = length(cross(path.direction, wi));
-        float first2 = even_distance2(path.pdf, sine, mean_extinction(m.sigma_t), push.photon_radius, float(SHARING_PHOTONS), has_beams);
-        path_even_distance2 = path_even_distance2 == 0.0 ? -first2 : abs(path_even_distance2);
+        note_scattering(path, m, wi, phase);
     }
+    path.pdf = phase;
     if (HAS_LIGHT_TREE) {
         path_receivers[slot] = LightReceiver(at, vec3(0.0));
     }
@@ -256,6 +291,9 @@ void main() {
         state = walk_medium_states[slot];
         if (SHARES) {
             path_even_distance2 = path_even_distances[slot];
+        }
+        if (SHARES_PLANES) {
+            path_flight = path_flights[slot];
         }
     }
     Hit hit = load_hit(place);
@@ -344,7 +382,8 @@ void main() {
         COUNT_MEDIUM(collisions, outcome == GRID_COLLIDED ? 1u : 0u)
         if (counted && emitted != vec3(0.0)) {
             if (SHARES && path_even_distance2 > 0.0) {
-                emitted *= eye_share(placeless_distance2(push.scene_lower, push.scene_upper), path_even_distance2);
+                float light2 = placeless_distance2(push.scene_lower, push.scene_upper);
+                emitted *= eye_share(SHARES_PLANES ? light2 / path_flight.evenness : light2, path_even_distance2);
             }
             walk_gathered[slot].radiance += emitted;
         }
@@ -378,6 +417,7 @@ void main() {
         path.throughput *= weight;
         state.start = past_surface(hit.t);
         interior = crossing.beyond;
+        path_flight.crossing = vec3(0.0);
         alive = path.throughput != vec3(0.0);
     } else {
         handled = false;
@@ -386,6 +426,9 @@ void main() {
     walk_medium_states[slot] = state;
     if (SHARES) {
         path_even_distances[slot] = path_even_distance2;
+    }
+    if (SHARES_PLANES) {
+        path_flights[slot] = path_flight;
     }
     walk_medium_events[place] = MediumEvent(weight, (flags & FLAG_AIRLIGHT) | (handled ? EVENT_HANDLED : 0u));
     walk_flags_out[place] = flags | (alive ? FLAG_ALIVE : 0u);

@@ -26,11 +26,14 @@ layout(local_size_x = 64) in;
 // Other means have the light of edges between two rough scatterings up to this bound; paths have what it leaves out.
 layout(constant_id = 35) const uint EDGE_BOUND = EDGE_UNBOUNDED;
 
-// The entry of path_even_distances of the path under way.
+// The entry of path_even_distances of the path under way, and that of path_flights with its last scattering.
 float path_even_distance2 = 0.0;
+float path_evenness = 1.0;
 
 // Share of the path in light that its ray meets. Until the second scattering (path_even_distance2 at most 0) that is the path's alone.
-float share_behind(float light2) { return path_even_distance2 > 0.0 ? eye_share(light2, path_even_distance2) : 1.0; }
+float share_behind(float light2) {
+    return path_even_distance2 > 0.0 ? eye_share(SHARES_PLANES ? light2 / path_evenness : light2, path_even_distance2) : 1.0;
+}
 
 // Weight of emission met by a direction of density pdf (0: not found by light sampling), which light sampling finds with light_pdf.
 float emission_weight(float pdf, float light_pdf) { return pdf > 0.0 ? power_heuristic(pdf, light_pdf) : 1.0; }
@@ -204,6 +207,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     if (SHARES) {
         path_even_distances[slot] = abs(path_even_distance2);
     }
+    if (SHARES_PLANES) {
+        path_flights[slot].evenness = 1.0;
+    }
     if (HAS_PATH_AUTOMATON) {
         path.bounce = path_set_joined(path.bounce, state);
     }
@@ -235,6 +241,9 @@ void main() {
     }
     if (SHARES) {
         path_even_distance2 = path_even_distances[slot];
+    }
+    if (SHARES_PLANES) {
+        path_evenness = path_flights[slot].evenness;
     }
     shade(slot, place, path, radiance, flags);
     if (radiance != vec3(0.0)) {

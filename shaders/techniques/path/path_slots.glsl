@@ -23,4 +23,13 @@ layout(set = 1, binding = 2, scalar) restrict buffer PathDepartures { float path
 // its negative between that and the next scattering, when only light samples are shared; positive after. Where nothing is shared, another buffer is bound.
 layout(set = 1, binding = 3, scalar) restrict buffer PathEvenDistances { float path_even_distances[]; };
 
+// What such paths keep besides where photons have planes.
+struct PathFlight {
+    // Of the directions before and after the first scattering in a medium: photons' planes have the light of the next one in its body. 0 once the path has left that.
+    vec3 crossing;
+    // 4 pi times the density of the last scattering, where it was a medium's; else 1.
+    float evenness;
+};
+layout(set = 1, binding = 4, scalar) restrict buffer PathFlights { PathFlight path_flights[]; };
+
 #endif

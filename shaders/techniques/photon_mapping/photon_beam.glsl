@@ -7,7 +7,8 @@
 // flights in the band that comes farthest do, it is what other bands have less of.
 // Of planes L = sum_j tau(t_j) sigma_s^2 p(w_j', -v) tau_j' Phi_j / |v . (w_j x w_j')| with the directions w_j and w_j' of both flights, and tau_j' what is left there of other
 // bands than the one that flights end as in: without blur. One of those that a ray meets has a ray that tells whether it is seen (photon_plane_ray.glsl).
-// Where collisions are stored beside beams each has the share of the balance heuristic (point_share). Where eye paths go on, both have but the share that these leave (share_left_by_eye_paths).
+// Where collisions are stored beside beams each has the share of the balance heuristic (point_share). Where eye paths go on, all have but the share that these leave (share_left_by_eye_paths,
+// share_left_to_plane).
 // Distances are measured from the eye, and the phase function is handed the way to the eye, -v. Events count in their own medium alone.
 //
 // With a queue (QUEUE) photon_beam_ways.comp has been to all places, and an invocation takes one of those that ask; without one an invocation per place first finds its way
@@ -99,6 +100,10 @@ vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s,
 // Share of a record's light that eye paths which go on leave to photons, by the density of its phase function.
 float share_left_by_eye_paths(uvec4 q2, float phase, float sine, bool has_beams) {
     float extinction = mean_extinction(beam.m.sigma_t);
+    if (PLANES) {
+        float across = across_of_beams(sine, extinction, push.radius);
+        return photon_share(beside_planes_light2(q2), even_distance2_across(across, phase, push.photons));
+    }
     return photon_share(unpack_light_distance2(q2), even_distance2(phase, sine, extinction, push.radius, push.photons, has_beams));
 }
 
@@ -128,6 +133,14 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
     }
 }
 
+// The same of a plane's light, of flights of these lengths and directions where the ray meets them, by the density of the second scattering. Only a share of ways has planes.
+float share_left_to_plane(PhotonPlane p, PlaneMeeting at, vec2 lengths, vec3 way, float phase) {
+    float across = across_of_planes(at.jacobian / (lengths.x * lengths.y), mean_extinction(beam.m.sigma_t));
+    float first = p.light < 0.0 ? phase_function(beam.m.phase, beam.m.phase_parameter, p.first / lengths.x, way) : 1.0;
+    float light2 = distance2_in_plane(p.light, at.along.x * lengths.x, first);
+    return photon_share(light2, even_distance2_across(across, phase, push.photons / push.plane_weight));
+}
+
 // Lets a plane's light count where the ray meets it, and its ray stand for all of them with the probability of its share.
 void add_plane(uint record, PhotonPlane p) {
     if (!counts_here(p.medium, p.bounce)) {
@@ -143,7 +156,11 @@ void add_plane(uint record, PhotonPlane p) {
     // Bands that scatter nothing have no light here, however far they come.
     float extinction = plane_extinction(beam.m.sigma_s, beam.m.sigma_t);
     vec3 left = relative_transmittance(max(beam.m.sigma_t, vec3(extinction)), extinction, dot(at.along, lengths));
-    float weight = lengths.x * lengths.y / at.jacobian * phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+    float phase = phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
+    float weight = lengths.x * lengths.y / at.jacobian * phase;
+    if (CARRIES_LIGHT_DISTANCE) {
+        weight *= share_left_to_plane(p, at, lengths, way, phase);
+    }
     vec3 light = weight * beam.m.sigma_s * beam.m.sigma_s * passed_to(at.t) * left * p.flux;
     float all_bands = light.x + light.y + light.z;
     if (!(all_bands > 0.0 && all_bands < FAR_AWAY)) {

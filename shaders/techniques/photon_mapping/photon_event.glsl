@@ -80,7 +80,7 @@ PhotonBeam unpack_beam(uvec4 q0, uvec4 q1) {
 }
 
 // Two flights of a photon through a homogeneous medium, as far as it has come on each: it may have been scattered anywhere on the first one, into the second. The first two
-// quarters are those of a beam along the first flight; the third one has the second flight, and is zero in a beam's record.
+// quarters are those of a beam along the first flight; the third one has the second flight, which is zero in a beam's record. Both have there what tells their light from eye paths'.
 struct PhotonPlane {
     vec3 start;
     vec3 first;
@@ -88,16 +88,21 @@ struct PhotonPlane {
     vec3 flux;    // at its start, as stored
     uint medium;
     uint bounce;  // scatterings before, with that between the flights
+    float light;  // as distance2_in_plane has it, m2 or m; 0 where no eye path has a share
 };
 
 void pack_plane(PhotonPlane p, out uvec4 q0, out uvec4 q1, out uvec4 q2) {
     pack_beam(PhotonBeam(p.start, p.start + p.first, p.flux, p.medium, p.bounce), q0, q1);
-    q2 = uvec4(floatBitsToUint(p.second), 0u);
+    q2 = uvec4(floatBitsToUint(p.second), floatBitsToUint(p.light));
 }
+
+// A beam beside planes has the squared distance of its light from the first scattering there, m2, or 0 where no eye path finds it.
+uvec4 pack_beside_planes(float light2) { return uvec4(uvec3(0u), floatBitsToUint(light2)); }
+float beside_planes_light2(uvec4 q2) { return uintBitsToFloat(q2.w); }
 
 PhotonPlane unpack_plane(uvec4 q0, uvec4 q1, uvec4 q2) {
     PhotonBeam b = unpack_beam(q0, q1);
-    return PhotonPlane(b.start, b.end - b.start, uintBitsToFloat(q2.xyz), b.flux, b.medium, b.bounce);
+    return PhotonPlane(b.start, b.end - b.start, uintBitsToFloat(q2.xyz), b.flux, b.medium, b.bounce, beside_planes_light2(q2));
 }
 
 bool is_plane(uvec4 q2) { return uintBitsToFloat(q2.xyz) != vec3(0.0); }

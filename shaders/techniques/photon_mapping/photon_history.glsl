@@ -16,9 +16,9 @@ const uint FLAG_LANDED = 32u;
 // A record waits there beside the way: a plane of two flights, or a collision, where these are stored as well.
 const uint FLAG_BESIDE = 64u;
 
-// Stand for the density of directions in a photon's walk, where planes are stored: whether its way begins at a collision with the medium that it goes through.
-const float PHOTON_FROM_COLLISION = 1.0;
-const float PHOTON_FROM_ELSEWHERE = 0.0;
+// Stand for the scale of radiance in a photon's walk, which eye paths alone keep, where planes are stored: whether its way begins at a collision with the medium that it goes through.
+const float PHOTON_FROM_COLLISION = 0.0;
+const float PHOTON_FROM_ELSEWHERE = 1.0;
 
 // In the word of the normal: the photon has been scattered diffusely, or in a medium.
 const uint PHOTON_DIFFUSED_BIT = 0x40000000u;

@@ -75,6 +75,16 @@ float radius_in(SceneMedium m, float radius) {
 // What a record has of the photon's light: its squared distance from the first scattering, m2, or 0.
 float recorded_light_distance2(WalkState photon) { return CARRIES_LIGHT_DISTANCE && path_set_bounce(photon.bounce) > 0u ? photon.pdf : 0.0; }
 
+// What a plane's record tells of the photon's light (distance2_in_plane), whose first flight begins at `start` of the photon's way and turns into that direction.
+float told_of_light(WalkState photon, SceneMedium m, float start, vec3 turned) {
+    if (!CARRIES_LIGHT_DISTANCE || path_set_bounce(photon.bounce) > 0u) {
+        return recorded_light_distance2(photon);
+    }
+    // Never 0, by which light is told that eye paths do not find.
+    return photon.pdf > 0.0 ? evened_distance2(photon.pdf, phase_function(m.phase, m.phase_parameter, photon.direction, turned))
+                            : -max(start, NORMAL_MIN);
+}
+
 // Stores the photon's way through a homogeneous medium, `reach` long.
 uint deposit_way(uint slot, uint place, WalkState photon, uint medium, SceneMedium m, float start, float reach) {
     uint bounce = path_set_bounce(photon.bounce);
@@ -132,10 +142,12 @@ uint deposit_plane(uint slot, uint place, WalkState photon, uint medium, SceneMe
     PhotonPlane plane;
     plane.start = photon.origin + start * photon.direction;
     plane.first = min(reach, flight(extinction, flights.x)) * photon.direction;
-    plane.second = (in_body ? min(far, push.body_reach) : far) * normalize(phase_direction(photon.direction, c, unit_float(turn.z)));
+    vec3 turned = normalize(phase_direction(photon.direction, c, unit_float(turn.z)));
+    plane.second = (in_body ? min(far, push.body_reach) : far) * turned;
     plane.flux = dithered_flux(photon.throughput * push.flux_scale, slot, path_set_bounce(photon.bounce));
     plane.medium = medium;
     plane.bounce = history;
+    plane.light = told_of_light(photon, m, start, turned);
     uvec4 q0;
     uvec4 q1;
     uvec4 q2;
@@ -187,12 +199,15 @@ bool scatter(uint slot, SceneMedium m, vec3 before, vec3 at, Footprint f, inout 
     }
     if (CARRIES_LIGHT_DISTANCE) {
         photon.pdf = carried_distance2(photon.pdf, bounce, distance(photon.origin, at), true);
+        if (STORES_PLANES && bounce == 0u) {
+            photon.pdf = evened_distance2(photon.pdf, phase_function(m.phase, m.phase_parameter, photon.direction, wi));
+        }
     }
     photon.direction = wi;
     photon.origin = at;
     photon.throughput /= survival;
     if (STORES_PLANES) {
-        photon.pdf = PHOTON_FROM_COLLISION;
+        photon.eta_scale = PHOTON_FROM_COLLISION;
     }
     photon.bounce = path_set_joined(bounce + 1u, after);
     return true;
@@ -242,7 +257,7 @@ void main() {
             float begin = max(state.start, 0.0);
             float reach = end >= FAR_AWAY ? FAR_AWAY : end - begin;
             // What comes of a way that begins at a collision is that of the plane of the way before.
-            bool in_plane = STORES_PLANES && photon.pdf == PHOTON_FROM_COLLISION;
+            bool in_plane = STORES_PLANES && photon.eta_scale == PHOTON_FROM_COLLISION;
             if (path_set_bounce(photon.bounce) >= push.first_deposit && !in_plane) {
                 float shown = reach;
                 if (SHORT_WAYS) {
@@ -328,7 +343,7 @@ void main() {
     } else if (crossing.boundary) {
         state.start = past_surface(hit.t);
         if (STORES_PLANES) {
-            photon.pdf = PHOTON_FROM_ELSEWHERE;
+            photon.eta_scale = PHOTON_FROM_ELSEWHERE;
         }
         interior = crossing.beyond;
         alive = photon.throughput != vec3(0.0);

@@ -184,13 +184,13 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
         flux *= adjoint_ratio(frame.z, s.geometric_normal, a.wo, wi);
     }
     float survival = walk_survival(photon.throughput, flux, bounce);
-    // Eye paths alone keep a scale of radiance: a photon's number stands there, made uniform again by each roulette.
+    // Eye paths alone keep a scale of radiance: a photon's number stands there, made uniform again by each roulette, or what it comes from.
     float draw = EVEN_SURVIVAL ? photon.eta_scale : side.y;
     // Also ends a photon whose flux is not a number.
     if (!(draw < survival)) {
         return false;
     }
-    photon.eta_scale = EVEN_SURVIVAL ? draw / survival : 1.0;
+    photon.eta_scale = EVEN_SURVIVAL ? draw / survival : PHOTON_FROM_ELSEWHERE;
     if (HAS_DIFFERENTIALS) {
         if ((scattered.flags & (LOBE_DIFFUSE | LOBE_GLOSSY)) != 0u) {
             // A re-emission takes nothing but the footprint's area along; specular lobes keep what is beyond all bounds.
@@ -212,8 +212,6 @@ bool scatter(uint slot, uint place, WalkState photon, inout uint flags) {
     photon.direction = normalize(wi);
     if (CARRIES_LIGHT_DISTANCE) {
         photon.pdf = carried_distance2(photon.pdf, bounce, hit.t, (scattered.flags & (LOBE_DIFFUSE | LOBE_GLOSSY)) != 0u);
-    } else if (HAS_MEDIA) {
-        photon.pdf = PHOTON_FROM_ELSEWHERE;
     }
     photon.bounce = path_set_joined(bounce + 1u, diffused);
     store_walk(slot, photon, HAS_MEDIA ? -way_left_out(s, photon.origin, photon.direction) : 0.0);

@@ -29,7 +29,7 @@ void append_way(uint place, uint event, uint pieces) {
         photon_volume_records[quarter] = q0;
         photon_volume_records[quarter + 1u] = q1;
         if (STORES_BESIDE) {
-            photon_volume_records[quarter + 2u] = STORES_POINTS ? pack_flight(from, way.light2, 0u) : uvec4(0u);
+            photon_volume_records[quarter + 2u] = STORES_POINTS ? pack_flight(from, way.light2, 0u) : pack_beside_planes(way.light2);
         }
     }
 }

@@ -62,6 +62,7 @@ fn they_are_counted_by_kind_and_left_out() {
             path_receivers: none,
             path_departures: none,
             path_even_distances: none,
+            path_flights: none,
         };
         let spec = path_resolve::Spec { write_aovs: false };
         let kernel = gpu.compute_pipeline::<path_resolve::Kernel>(&spec).unwrap();

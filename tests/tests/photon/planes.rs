@@ -1,9 +1,11 @@
-//! Photon planes: closed forms, the path tracer on the light paths that they alone carry, and what they share with beams.
+//! Photon planes: closed forms, the path tracer on the light paths that they alone carry, and what they share with beams and with eye paths that go on.
 
-use super::volume::{airlight, coloured, endless, lit_box, single};
+use super::queues::FORMS;
+use super::volume::{airlight, behind_a_pane, box_by_a_lamp, coloured, endless, lit_box, single};
 use super::volume_truths::{exactly, parallel};
 use super::*;
-use clerestory::scene::{AlphaMode, Medium, Phase};
+use clerestory::scene::{AlphaMode, Environment, Medium, Phase};
+use clerestory::techniques::photon_mapping::MapBuild;
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
 use clerestory_tests::render::{builtin, cuboid, medium};
 use clerestory_tests::with_gpu;
@@ -244,5 +246,147 @@ fn errors_of_planes_fall_with_the_root_of_passes() {
         // Where nothing shrinks, blur stays.
         assert!((slope(VolumeEstimate::Planes, 96) + 0.5).abs() < 0.1);
         assert!(slope(VolumeEstimate::Beams, 48) > -0.4);
+    });
+}
+
+/// With eye paths that go on, and so few photons under such narrow kernels that these have a good part of the light.
+fn sharing(set: &str) -> PhotonSettings {
+    PhotonSettings {
+        volume_paths: true,
+        volume_radius: 0.02,
+        radius: 0.1,
+        ..planes(set, 1 << 11)
+    }
+}
+
+/// The box of a medium under a sky instead of its light.
+fn under_a_sky(medium: Medium) -> Scene {
+    let mut scene = lit_box(medium);
+    scene.name = "sky".into();
+    scene.lights.clear();
+    scene.environment = Some(Environment::uniform(Vec3::new(0.5, 1.0, 2.0)));
+    scene
+}
+
+/// Planes alone are up to a third too dark here. Of a point light the path tracer finds as few of the connections that count, and is no reference: lights are wide.
+#[test]
+fn eye_paths_have_what_planes_lack_of_narrow_phase_functions() {
+    with_gpu(|gpu| {
+        for g in [0.95, -0.95] {
+            let narrow = || medium(2.0, 0.9, Phase::HenyeyGreenstein { g });
+            for (scene, samples) in [(box_by_a_lamp(narrow()), 4096), (under_a_sky(narrow()), 512)] {
+                let counts = expect_agreement(gpu, &scene, &sharing(OF_PLANES), [24, samples], [0.0; 3]);
+                assert!(counts.beams.photons > 300);
+            }
+        }
+    });
+}
+
+#[test]
+fn eye_paths_share_the_light_of_planes_and_of_beams() {
+    with_gpu(|gpu| {
+        // A body within the body, and another one of the same medium beside it: ways between bodies are those of beams.
+        let mut nested = lit_box(coloured());
+        nested.name = "nested".into();
+        nested.media.push(medium(6.0, 0.7, Phase::HenyeyGreenstein { g: -0.5 }));
+        let inside = nested.add_material(Material {
+            name: "inside".into(),
+            boundary: true,
+            interior: Some(1),
+            ..Material::default()
+        });
+        nested.place(cuboid("inside", inside, Vec3::splat(-0.2), Vec3::splat(0.2)));
+        let boundary = nested.meshes[1].material.unwrap_or(0);
+        let (low, high) = (Vec3::new(0.55, -0.5, -0.5), Vec3::new(0.8, 0.2, 0.5));
+        nested.place(cuboid("beside", boundary, low, high));
+        nested.cameras = vec![camera_down(0.85, 5.0)];
+        let alone = lit_box(medium(2.0, 0.8, Phase::Isotropic));
+        for scene in [&alone, &nested] {
+            // As of beams in one box (`volume.rs`).
+            let counts = expect_agreement(gpu, scene, &sharing("bounces=2..4"), [24, 1024], [1.5e-2; 3]);
+            assert!(counts.beams.photons > 300);
+        }
+        // Without what beams blur, and with planes of a share of ways.
+        let of_a_share = PhotonSettings {
+            volume_radius: 0.0,
+            ..sharing(OF_PLANES)
+        };
+        expect_agreement(gpu, &alone, &of_a_share, [24, 1024], [0.0; 3]);
+    });
+}
+
+#[test]
+fn light_of_every_kind_is_shared_with_planes() {
+    with_gpu(|gpu| {
+        let fog = || medium(2.0, 0.8, Phase::HenyeyGreenstein { g: 0.4 });
+        let glow = Medium {
+            emission: Vec3::new(2.0, 1.0, 0.5),
+            ..fog()
+        };
+        // Without a place, of a medium, and scattered by a pane first, which no eye path may have.
+        for (scene, set) in [
+            (under_a_sky(fog()), OF_PLANES),
+            (lit_box(glow), OF_PLANES),
+            (behind_a_pane(fog()), OF_PLANES),
+            (builtin("builtin:fog-box?sphere=glass&sigma_s=3"), OF_PLANES),
+            (lit_box(fog()), "LVVE"),
+        ] {
+            expect_agreement(gpu, &scene, &sharing(set), [24, 1024], [0.0; 3]);
+        }
+        let with_direct_light = PhotonSettings {
+            direct_photons: true,
+            ..sharing("bounces=1..3")
+        };
+        // As of beams in one box (`volume.rs`).
+        expect_agreement(gpu, &lit_box(fog()), &with_direct_light, [24, 1024], [1.5e-2; 3]);
+    });
+}
+
+/// A ray along the first flight of a plane lies in it, wherever the second one goes.
+#[test]
+fn eye_paths_have_parallel_light_along_parallel_rays() {
+    with_gpu(|gpu| {
+        let mut scene = lit_box(medium(2.0, 0.8, Phase::Isotropic));
+        scene.lights.clear();
+        let (direction, irradiance) = (Vec3::NEG_Y, Vec3::splat(3.0));
+        scene.add_light("sun", LightKind::Directional { direction, irradiance });
+        expect_agreement(gpu, &scene, &sharing("LVVE"), [24, 512], [0.0; 3]);
+    });
+}
+
+#[test]
+fn shares_of_planes_have_the_same_bits_however_it_is_done() {
+    with_gpu(|gpu| {
+        let scene = lit_box(coloured());
+        let usual = PhotonSettings {
+            photons: 1 << 10,
+            reduction: 2.0 / 3.0,
+            ..sharing("all")
+        };
+        let made = |settings: &PhotonSettings| bits(&photons(gpu, &scene, settings, 3));
+        let truth = made(&usual);
+        assert_eq!(made(&usual), truth, "two runs");
+        let in_parts = PhotonSettings {
+            submission_work: 1 << 12,
+            ..usual.clone()
+        };
+        assert_eq!(made(&in_parts), truth, "in short submissions");
+        let by_host = PhotonSettings {
+            map_build: MapBuild::Host,
+            ..usual.clone()
+        };
+        assert_eq!(made(&by_host), truth, "a map by the host");
+        let (queue, query) = FORMS[1];
+        let queued = PhotonSettings {
+            queue,
+            query,
+            ..usual.clone()
+        };
+        assert_eq!(made(&queued), truth, "from a queue");
+        let alone = PhotonSettings {
+            volume_paths: false,
+            ..usual
+        };
+        assert_ne!(made(&alone), truth, "without eye paths");
     });
 }

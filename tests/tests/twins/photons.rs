@@ -25,7 +25,8 @@ use clerestory::transport::differentials::{
     rough_reemission, roulette_differentials, transfer_differentials,
 };
 use clerestory::transport::photon_share::{
-    carried_distance2, even_distance2, eye_share, photon_share, placeless_distance2,
+    across_of_planes, carried_distance2, distance2_in_plane, even_distance2, even_distance2_across, evened_distance2,
+    eye_share, photon_share, placeless_distance2,
 };
 use clerestory_tests::random::Random;
 use clerestory_tests::twin::{Case, Results, Tolerance, U, compare};
@@ -680,6 +681,7 @@ fn shares_with_eye_paths_agree_with_their_twins() {
                     code(r.below(3)),
                     r.range(0.0, 5.0),
                     code(r.below(2)),
+                    r.choose(&[0.0, 3.0, -0.25, -f32::MIN_POSITIVE]),
                 ],
             )
         });
@@ -696,6 +698,9 @@ fn shares_with_eye_paths_agree_with_their_twins() {
                 photon_share(x[12], even2),
                 placeless2,
                 carried2,
+                even_distance2_across(across_of_planes(x[7], x[8]), x[6], x[10]),
+                evened_distance2(x[12], x[6]),
+                distance2_in_plane(x[17], x[15], x[6]),
             ];
             for (i, twin) in twins.into_iter().enumerate() {
                 let found = f64::from(result.0[i]);
@@ -728,7 +733,8 @@ fn planes_agree_with_their_twins() {
             let extinctions = [0; 3].map(|_| r.choose(&[0.0, 0.5, 1.0, 3.0]));
             let scatters = [0; 3].map(|_| r.choose(&[0.0, 0.25]));
             let media = [extinctions, scatters].map(Vec3::from_array);
-            all.extend(list32(&[4.0 * r.vector(), ray, media[0], media[1]], &[]));
+            let light = r.choose(&[0.0, 2.5, -0.5]);
+            all.extend(list32(&[4.0 * r.vector(), ray, media[0], media[1]], &[light]));
             all
         });
         let results = twin_photons(gpu, 9, &table, &[]);
@@ -742,12 +748,14 @@ fn planes_agree_with_their_twins() {
                 flux: at(9),
                 medium: case.0[12].to_bits(),
                 bounce: case.0[13].to_bits(),
+                light: case.0[26],
             };
             let words = pack_plane(&plane);
             assert_eq!([result.bits(0), result.bits(1)], [words[0][3], words[1][3]]);
             assert_eq!(result.bits(2), u32::from(is_plane(&words)));
             let back = unpack_plane(&words);
             assert_eq!([result.bits(3), result.bits(4)], [back.medium, back.bounce]);
+            assert_eq!([result.0[14], back.light], [plane.light; 2]);
             // The end of the first flight was rounded.
             let off = Vec3::from_slice(&result.0[5..]) - back.first;
             assert!(f64::from(off.abs().max_element()) <= 16.0 * U, "{off}");

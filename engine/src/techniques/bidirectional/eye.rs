@@ -153,6 +153,7 @@ impl EyeMemory {
             path_receivers: self.aovs.view(),
             path_departures: self.aovs.view(),
             path_even_distances: self.aovs.view(),
+            path_flights: self.aovs.view(),
         }
     }
 

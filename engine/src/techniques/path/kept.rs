@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::gpu::shaders::sets::PathSlotSet;
-use crate::gpu::shaders::types::{LightReceiver, PathAov};
+use crate::gpu::shaders::types::{LightReceiver, PathAov, PathFlight};
 use crate::gpu::{Buffer, BufferDesc, Category, Gpu};
 
 /// Its memory; what no kernel reads or writes has none.
@@ -14,6 +14,8 @@ pub(super) struct KeptBySlot {
     departures: Option<Buffer>,
     /// By what they share light with photons, where they do.
     even_distances: Option<Buffer>,
+    /// How they were scattered first and last, where photons have planes.
+    flights: Option<Buffer>,
     /// What an arrival stage keeps by place.
     stage: Option<Buffer>,
 }
@@ -25,6 +27,7 @@ pub(super) struct KeptNeeds {
     pub receivers: bool,
     pub departures: bool,
     pub even_distances: bool,
+    pub flights: bool,
     /// Of an arrival stage, by place.
     pub stage_bytes: u64,
 }
@@ -38,6 +41,7 @@ impl KeptBySlot {
         let receivers = || work("path receivers", size_of::<LightReceiver>(), slots);
         let departures = || work("path departures", size_of::<f32>(), slots);
         let even_distances = || work("path even distances", size_of::<f32>(), slots);
+        let flights = || work("path flights", size_of::<PathFlight>(), slots);
         let stage = || {
             let bytes = has.stage_bytes * u64::from(slots);
             gpu.buffer(&BufferDesc::storage("arrival stage", bytes, Category::Work))
@@ -47,6 +51,7 @@ impl KeptBySlot {
             receivers: has.receivers.then(receivers).transpose()?,
             departures: has.departures.then(departures).transpose()?,
             even_distances: has.even_distances.then(even_distances).transpose()?,
+            flights: has.flights.then(flights).transpose()?,
             stage: (has.stage_bytes > 0).then(stage).transpose()?,
         })
     }
@@ -58,6 +63,7 @@ impl KeptBySlot {
             path_receivers: self.receivers.as_ref().unwrap_or(&self.aovs).view(),
             path_departures: self.departures().view(),
             path_even_distances: self.even_distances.as_ref().unwrap_or(&self.aovs).view(),
+            path_flights: self.flights.as_ref().unwrap_or(&self.aovs).view(),
         }
     }
 

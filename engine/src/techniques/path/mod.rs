@@ -36,6 +36,7 @@ use self::record::{EyeStages, ResolveTarget, UnderWay, record_resolve};
 use self::refill::{FullWave, ResultMemory, slot_numbers};
 pub use self::settings::{Adaptive, LightTreeUse, PathTracerSettings};
 use self::shared_light::SharedLight;
+pub(crate) use self::shared_light::SharingPhotons;
 pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -178,8 +179,8 @@ impl PathTracer {
         Self::beside(gpu, scene, camera, size, settings, shared_light, stage_bytes)
     }
 
-    /// As [`PathTracer::new`], for pictures in which so many photons of a pass share what paths scatter behind their first scattering in a medium
-    /// ([`photon_share`](crate::transport::photon_share)), but its direct light: paths have what these leave. 0: all that their path set has. Waves are whole, and an
+    /// As [`PathTracer::new`], for pictures in which these photons of a pass share what paths scatter behind their first scattering in a medium
+    /// ([`photon_share`](crate::transport::photon_share)), but its direct light: paths have what these leave; of none all that their path set has. Waves are whole, and an
     /// [`ArrivalStage`] has `stage_bytes` of memory by place as with [`PathTracer::beyond`].
     pub(crate) fn beside_photons(
         gpu: &Gpu,
@@ -187,15 +188,17 @@ impl PathTracer {
         camera: &Camera,
         size: [u32; 2],
         settings: PathTracerSettings,
-        photons: u32,
+        sharing: SharingPhotons,
         stage_bytes: u64,
     ) -> Result<Self> {
+        let SharingPhotons { photons, have_planes } = sharing;
         debug_assert!(
             photons == 0 || !settings.keeps_waves_full(),
             "paths of whole waves begin together"
         );
         let shared_light = SharedLight {
             photons,
+            plane_share: (photons > 0 && have_planes).then_some(1.0),
             ..SharedLight::default()
         };
         Self::beside(gpu, scene, camera, size, settings, shared_light, stage_bytes)
@@ -256,6 +259,7 @@ impl PathTracer {
                 receivers: light_tree.is_some(),
                 departures: has_departures,
                 even_distances: shared_light.photons > 0,
+                flights: shared_light.plane_share.is_some(),
                 stage_bytes,
             };
             let kept = KeptBySlot::new(gpu, slots, has)?;
@@ -465,9 +469,11 @@ impl PathTracer {
         self.kept.departures().clone()
     }
 
-    /// Within which photons are seen that share light with the paths, m: for waves that have not begun.
-    pub(crate) fn see_photons_within(&mut self, radius: f64) {
-        self.shared_light.photon_radius = radius as f32;
+    /// Within which photons are seen that share light with the paths, m, and which share of their ways has planes, if any has: for waves that have not begun.
+    pub(crate) fn see_photons(&mut self, radius: f64, plane_share: f64) {
+        let light = &mut self.shared_light;
+        light.photon_radius = radius as f32;
+        light.plane_share = light.plane_share.map(|_| plane_share as f32);
     }
 
     /// What an arrival stage keeps by place, of as many bytes as were asked for.

@@ -93,6 +93,7 @@ impl Pipelines {
             count_fetches: settings.count_fetches,
             edge_bound: shared_light.edge_bound.kind(),
             sharing_photons: shared_light.photons,
+            shares_planes: shared_light.plane_share.is_some(),
         });
         let medium = path_medium::Spec {
             // What surfaces scatter by is not compiled into this stage.
@@ -112,6 +113,7 @@ impl Pipelines {
             has_path_automaton: shade.has_path_automaton,
             numbered: shade.numbered,
             sharing_photons: shade.sharing_photons,
+            shares_planes: shade.shares_planes,
             has_grids: profile.media.heterogeneous,
             has_homogeneous: profile.media.homogeneous,
             has_airlight: settings.equiangular && scene.airlight_helps(),

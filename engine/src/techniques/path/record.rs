@@ -91,7 +91,7 @@ impl EyeStages<'_> {
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             accepting: settings.path_set.accepting(),
             successors: settings.path_set.successors(),
-            edge_bound: self.shared_light.edge_bound.value(),
+            edge_bound: self.shared_light.bound_or_plane_share(),
             photon_radius: self.shared_light.photon_radius,
         }
     }

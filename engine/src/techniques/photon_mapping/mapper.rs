@@ -33,7 +33,7 @@ use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
-use crate::techniques::path::PathCounters;
+use crate::techniques::path::{PathCounters, SharingPhotons};
 use crate::techniques::{PathTracer, PathTracerSettings};
 use crate::transport::GpuScene;
 use crate::walk::ArrivalStage;
@@ -198,7 +198,10 @@ impl PhotonMapper {
         let tracer = tracer.transpose()?;
         // Takes as much memory as is left, if it must, with what gathering keeps.
         let kept = if has_map { Gather::slot_bytes(&scene) } else { 0 };
-        let beside = if shares { settings.photons } else { 0 };
+        let beside = SharingPhotons {
+            photons: if shares { settings.photons } else { 0 },
+            have_planes: settings.volume.stores_planes(),
+        };
         let eye = PathTracer::beside_photons(gpu, Arc::clone(&scene), camera, size, eye_settings, beside, kept)?;
         let memory = (eye.slots(), eye.stage_memory());
         let photons = match tracer {
@@ -408,7 +411,7 @@ impl PhotonMapper {
             _ => None,
         };
         let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
-        self.eye.see_photons_within(event_kernel.length_max);
+        self.eye.see_photons(event_kernel.length_max, plane_share);
         let step = self.eye.step_with(end, arrival)?;
         if let Some(photons) = &mut self.photons {
             // They are those of a whole wave.

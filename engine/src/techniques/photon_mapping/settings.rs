@@ -171,10 +171,11 @@ crate::settings! {
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
         /// From which size on kernels in media that follow footprints grow slower, by a logarithm, in unit lengths; 0 leaves them as they are.
         pub volume_dampening: f32 = 3.0, in 0.0..;
-        /// Eye paths go on behind their first scattering in a medium, and share the light that they find there with collisions and ways, each weighted by what the others have of it; for
-        /// `unified` alone, and not with final_gather.
+        /// Eye paths go on behind their first scattering in a medium, and share the light that they find there with photons, each weighted by what the others have of it; for
+        /// `unified` and `planes` alone, and not with final_gather.
         ///
-        /// They take time for a share that is small where there are many photons; most worth it under narrow kernels.
+        /// Off by default, with planes, too: they take time for a share that is small where there are many photons; most worth it under narrow kernels, and with planes under narrow phase functions,
+        /// where these alone have their light by rare spikes and pictures of few passes are too dark.
         pub volume_paths: bool = false;
         /// Takes direct light from the map, too, instead of by shadow rays; cannot be combined with final_gather.
         pub direct_photons: bool = false;
@@ -233,8 +234,11 @@ impl PhotonSettings {
             let cause = "needs \"queue\": \"slots\" and \"query\": \"single\": a queue is filled between the kernels that it fuses";
             return Err(Error::setting("stages", "fused", cause));
         }
-        if self.volume_paths && self.volume != VolumeEstimate::Unified {
-            let cause = format!("needs \"volume\": \"unified\", but that is \"{}\"", self.volume.word());
+        if self.volume_paths && !self.volume.shares_with_paths() {
+            let cause = format!(
+                "needs \"volume\": \"unified\" or \"planes\", but that is \"{}\"",
+                self.volume.word()
+            );
             return Err(Error::setting("volume_paths", true, cause));
         }
         if self.volume_paths && self.final_gather {

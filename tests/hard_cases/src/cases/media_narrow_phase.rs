@@ -15,7 +15,7 @@ pub(super) const CASE: HardCase = HardCase {
     documented_bias: Some(
         "Photons of the map lack beyond the boundary of a medium: what a ray sees within a kernel's radius of it, a quarter of a mean free path, is too dark where it is not met \
          head-on. Kernels shrink from pass to pass; choose a smaller radius. Beams and planes have most of their light by the few photons that fly nearly along a ray: pictures of \
-         few passes are too dark; take more of them.",
+         few passes are too dark; take more of them, or let eye paths share the light of planes (setting `volume_paths`).",
     ),
     documented_walks: Some(
         "Most of the light comes by the few virtual lights whose walks came nearly along the way to the place they light: pictures of few passes are too dark; take more of them.",

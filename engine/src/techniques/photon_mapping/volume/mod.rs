@@ -7,8 +7,15 @@
 //! Transport", ACM TOG 36(4), 2017; J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014.
 //!
 //! What is seen first by a scattering in a medium is the eye paths' where it is the only one, unless the map has direct light, and else the photons'. With eye paths that go on
-//! ([`volume_paths`](super::PhotonSettings::volume_paths)) collisions, beams and eye paths share it, each path of light by weights that sum to one
-//! ([`photon_share`](crate::transport::photon_share)), but for what a mirror scatters first, which no light sample finds: that stays with collisions and beams.
+//! ([`volume_paths`](super::PhotonSettings::volume_paths)) photons and eye paths share it, each path of light by weights that sum to one
+//! ([`photon_share`](crate::transport::photon_share)), but for what a mirror scatters first, which no light sample finds: that stays with collisions, beams and planes.
+//!
+//! Beside planes each path of light is of one of two kinds, by the scattering x₁ that comes before the one that is seen, x₀, on its way from the light. Planes have it where x₁ lies in the medium of x₀ with
+//! neither a surface nor a boundary in between: then the way from x₁ on begins at a collision, and is no beam. Beams have it elsewhere: from a surface, from behind a boundary of media, and from the light
+//! itself. Of ways that only by chance have planes these have their light over the chance. An eye path that goes on knows either kind once it has been scattered at x₀ and again at x₁: it is that of planes if
+//! both are collisions and it has passed no boundary on the way. With a weight of the kind's own (the volume that its two last flights and the ray span, or a beam's angle) it carries what photons of that kind
+//! leave. Both sides know all that a weight is a function of: directions, the density at x₀, the medium there, how far the light is from the first scattering and how that turned it, which photons carry
+//! along. Light that is scattered once is shared by nobody, as without.
 //!
 //! Nothing of it is made for scenes without media. Bias: kernels blur, and lose the light of media by walls and boundaries as far as they reach, since there are
 //! no events beyond; a thin wall lets them through. Both fade as kernels shrink. Planes have none: what they carry is unbiased, the rest comes by beams.
@@ -42,7 +49,8 @@ pub enum VolumeEstimate {
     Ray,
     /// Beams: ways of photons through homogeneous media, as far as the next surface or by chance ([`BeamLength`](ways::BeamLength)), each seen where the ray passes it.
     Beams,
-    /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else.
+    /// Planes that two flights in a row through one homogeneous medium span, without kernels, each seen where the ray meets it; and beams for all else. With
+    /// [`volume_paths`](super::PhotonSettings::volume_paths) each is weighted by what eye paths have of it that go on.
     Planes,
     /// Collisions and, in homogeneous media, ways: disks and beams, each weighted by what the other has of the same light (balance heuristic); with
     /// [`volume_paths`](super::PhotonSettings::volume_paths) also by what eye paths have of it that go on.
@@ -76,6 +84,11 @@ impl VolumeEstimate {
     /// And collisions beside the ways.
     pub(super) fn stores_points(self) -> bool {
         self == Self::Unified
+    }
+
+    /// Whether it knows what eye paths have of its light that go on.
+    pub(super) fn shares_with_paths(self) -> bool {
+        matches!(self, Self::Unified | Self::Planes)
     }
 
     /// Whether a map has records of another kind beside beams.
@@ -258,7 +271,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-PHOTON-PLANES",
         name: "photon planes: two flights in a row through a medium, seen where a ray meets what they span, without kernels",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Homogeneous media alone, and only light scattered there twice at last with nothing in between, the rest by beams; short flights; a ray nearly in a plane is noise without bound, by which the variance grows with the logarithm of the number of planes; parallel light along parallel rays is missing; one ray along a flight stands for all planes of an eye path's way.",
+        limits: "Homogeneous media alone, and only light scattered there twice at last with nothing in between, the rest by beams; short flights; one ray along a flight stands for all planes of an eye path's way; without `volume_paths`, by which eye paths share the light of planes, and for what a mirror scatters first, a ray nearly in a plane is noise without bound, by which the variance grows with the logarithm of the number of planes, pictures of few passes are too dark under narrow phase functions, and parallel light along parallel rays is missing.",
         sources: &[sources::BITTERLI_JAROSZ_2017.whole()],
         bias: Some(Bias::Unbiased),
         shaders: &[
@@ -267,11 +280,17 @@ pub(crate) const ROWS: &[Row] = &[
             "shaders/techniques/photon_mapping/photon_medium.comp",
             "shaders/techniques/photon_mapping/photon_plane_ray.glsl",
             "shaders/techniques/photon_mapping/photon_plane_rays.comp",
+            "shaders/transport/photon_share.glsl",
+            "shaders/techniques/path/path_medium.comp",
+            "shaders/techniques/path/path_shade.comp",
         ],
         tests: &[
             "engine/src/techniques/photon_mapping/volume/plane.rs::planes_come_back_and_their_boxes_hold_them",
             "engine/src/techniques/photon_mapping/volume/plane.rs::rays_meet_planes_where_both_are",
             "engine/src/techniques/photon_mapping/volume/plane.rs::planes_have_the_double_scattering_integral",
+            "engine/src/techniques/photon_mapping/volume/plane.rs::eye_paths_and_planes_know_one_volume",
+            "engine/src/transport/photon_share.rs::planes_share_by_densities_of_narrow_phase_functions",
+            "engine/src/transport/photon_share.rs::shares_of_planes_make_up_for_their_volume",
             "tests/tests/photon/planes.rs::planes_have_the_exact_multiple_scattering",
             "tests/tests/photon/planes.rs::planes_agree_with_the_path_tracer_without_blur",
             "tests/tests/photon/planes.rs::planes_and_beams_have_every_path_once",
@@ -282,12 +301,19 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/photon/planes.rs::planes_of_thin_bodies_are_no_larger_than_these",
             "tests/tests/photon/planes.rs::what_is_chosen_alone_has_planes",
             "tests/tests/photon/planes.rs::errors_of_planes_fall_with_the_root_of_passes",
+            "tests/tests/photon/planes.rs::eye_paths_have_what_planes_lack_of_narrow_phase_functions",
+            "tests/tests/photon/planes.rs::eye_paths_share_the_light_of_planes_and_of_beams",
+            "tests/tests/photon/planes.rs::light_of_every_kind_is_shared_with_planes",
+            "tests/tests/photon/planes.rs::eye_paths_have_parallel_light_along_parallel_rays",
+            "tests/tests/photon/planes.rs::shares_of_planes_have_the_same_bits_however_it_is_done",
             "tests/tests/photon/volume_extremes.rs::planes_stay_finite",
             "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_planes",
+            "tests/tests/photon/volume_extremes.rs::furnaces_are_even_by_planes_and_eye_paths",
             "tests/tests/photon/volume_extremes.rs::planes_agree_with_the_path_tracer_whichever_way_phase_functions_point",
             "tests/tests/twins/photons.rs::planes_agree_with_their_twins",
+            "tests/tests/twins/photons.rs::shares_with_eye_paths_agree_with_their_twins",
         ],
-        settings: &["volume"],
+        settings: &["volume", "volume_paths"],
         ..Row::of("engine/src/techniques/photon_mapping/volume/plane.rs")
     },
     Row {

@@ -5,7 +5,9 @@
 //! short: each ends by chance, as in the band that comes farthest of those that scatter.
 //!
 //! Guarantees: nothing is blurred; boxes hold their planes but for rounding. Limits: a ray in the plane itself has no bound, and little of a plane's area:
-//! the variance of what one ray sees grows with the logarithm of the number of planes.
+//! the variance of what one ray sees grows with the logarithm of the number of planes. Under narrow phase functions nearly all light comes by flights that are nearly parallel to each other and to
+//! rays, so that pictures of some dozens of passes are too dark. Where eye paths go on ([`volume_paths`](crate::techniques::photon_mapping::PhotonSettings::volume_paths)) a plane has the share of its
+//! light that makes up for the volume that stands below it ([`photon_share`](crate::transport::photon_share)): the limits are then those of light that a mirror scatters first, which is the planes' alone.
 
 use super::event::{PhotonBeam, pack_beam, unpack_beam};
 use crate::gpu::shaders::constants::WIDE_QUARTERS;
@@ -29,6 +31,8 @@ pub struct PhotonPlane {
     pub medium: u32,
     /// Scatterings before the end of the second flight, at most [`PHOTON_BOUNCE_MAX`](crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX).
     pub bounce: u32,
+    /// What tells how far its light was from its first scattering, as [`distance2_in_plane`](crate::transport::photon_share::distance2_in_plane) has it; 0 where eye paths have no share of it.
+    pub light: f32,
 }
 
 /// The words of a plane.
@@ -41,12 +45,12 @@ pub fn pack_plane(p: &PhotonPlane) -> WideWords {
         bounce: p.bounce,
     });
     let [x, y, z] = p.second.to_array().map(f32::to_bits);
-    [q0, q1, [x, y, z, 0]]
+    [q0, q1, [x, y, z, p.light.to_bits()]]
 }
 
 /// The plane of these words.
 pub fn unpack_plane(words: &WideWords) -> PhotonPlane {
-    let [q0, q1, [x, y, z, _]] = *words;
+    let [q0, q1, [x, y, z, light]] = *words;
     let beam = unpack_beam(&[q0, q1]);
     PhotonPlane {
         start: beam.start,
@@ -55,6 +59,7 @@ pub fn unpack_plane(words: &WideWords) -> PhotonPlane {
         flux: beam.flux,
         medium: beam.medium,
         bounce: beam.bounce,
+        light: f32::from_bits(light),
     }
 }
 
@@ -129,6 +134,7 @@ mod tests {
             flux: Vec3::new(random.unit(), random.unit(), random.unit()),
             medium: bounce * 3,
             bounce,
+            light: random.signed(),
         }
     }
 
@@ -141,8 +147,8 @@ mod tests {
             assert!(is_plane(&words) && size_of_val(&words) == 48);
             let back = unpack_plane(&words);
             assert_eq!(
-                (back.start, back.second, back.medium),
-                (plane.start, plane.second, plane.medium)
+                (back.start, back.second, back.medium, back.light),
+                (plane.start, plane.second, plane.medium, plane.light)
             );
             assert_eq!(back.bounce, bounce.min(PHOTON_BOUNCE_MAX));
             assert!((back.first - plane.first).abs().max_element() < 1e-6);
@@ -163,7 +169,7 @@ mod tests {
                 second: Vec3::ZERO,
                 ..plane
             });
-            assert!(!is_plane(&beam));
+            assert!(!is_plane(&beam), "whatever its light is");
         }
     }
 
@@ -188,6 +194,20 @@ mod tests {
         // Nor those that scatter nothing.
         let (sigma_s, sigma_t) = (DVec3::new(0.5, 0.0, 1.0), DVec3::new(2.0, 0.1, 1.5));
         assert_eq!(plane_extinction(sigma_s, sigma_t), 1.5);
+    }
+
+    #[test]
+    fn eye_paths_and_planes_know_one_volume() {
+        let mut random = Random(14);
+        for _ in 0..1000 {
+            let [origin, start, first, second] = [0; 4].map(|_| random.vector().as_dvec3());
+            let ray = random.direction().as_dvec3().normalize();
+            let of_plane = meet_plane(origin, ray, start, first, second).jacobian / (first.length() * second.length());
+            // An eye path goes the second flight back, and then looks back along the first.
+            let crossing = ray.cross(-second.normalize());
+            let of_path = crossing.dot(-first.normalize()).abs();
+            assert!((of_plane - of_path).abs() < 1e-13, "{of_plane} {of_path}");
+        }
     }
 
     #[test]
