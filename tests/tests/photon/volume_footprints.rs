@@ -153,7 +153,7 @@ fn expect(gpu: &Gpu, scene: &Scene, settings: PhotonSettings, bounce: u32, layer
         let place = event.position.as_dvec3();
         let off = DVec2::new(place.x, place.y).length();
         // Beside the bodies' edges ways may come in by other faces, and on the axis an angle has no size.
-        if off > 0.9 * HALF || off < 1e-2 {
+        if !(1e-2..=0.9 * HALF).contains(&off) {
             continue;
         }
         let sine = sine_to(layers, off, place.z);
