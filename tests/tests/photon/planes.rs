@@ -1,11 +1,10 @@
 //! Photon planes: closed forms, the path tracer on the light paths that they alone carry, and what they share with beams and with eye paths that go on.
 
-use super::queues::FORMS;
+use super::shared_paths::expect_same_bits_however_it_is_done;
 use super::volume::{airlight, behind_a_pane, box_by_a_lamp, coloured, endless, lit_box, single};
 use super::volume_truths::{exactly, parallel};
 use super::*;
 use clerestory::scene::{AlphaMode, Environment, Medium, Phase};
-use clerestory::techniques::photon_mapping::MapBuild;
 use clerestory::techniques::photon_mapping::volume::VolumeEstimate;
 use clerestory_tests::render::{builtin, cuboid, medium};
 use clerestory_tests::with_gpu;
@@ -356,37 +355,5 @@ fn eye_paths_have_parallel_light_along_parallel_rays() {
 
 #[test]
 fn shares_of_planes_have_the_same_bits_however_it_is_done() {
-    with_gpu(|gpu| {
-        let scene = lit_box(coloured());
-        let usual = PhotonSettings {
-            photons: 1 << 10,
-            reduction: 2.0 / 3.0,
-            ..sharing("all")
-        };
-        let made = |settings: &PhotonSettings| bits(&photons(gpu, &scene, settings, 3));
-        let truth = made(&usual);
-        assert_eq!(made(&usual), truth, "two runs");
-        let in_parts = PhotonSettings {
-            submission_work: 1 << 12,
-            ..usual.clone()
-        };
-        assert_eq!(made(&in_parts), truth, "in short submissions");
-        let by_host = PhotonSettings {
-            map_build: MapBuild::Host,
-            ..usual.clone()
-        };
-        assert_eq!(made(&by_host), truth, "a map by the host");
-        let (queue, query) = FORMS[1];
-        let queued = PhotonSettings {
-            queue,
-            query,
-            ..usual.clone()
-        };
-        assert_eq!(made(&queued), truth, "from a queue");
-        let alone = PhotonSettings {
-            volume_paths: false,
-            ..usual
-        };
-        assert_ne!(made(&alone), truth, "without eye paths");
-    });
+    with_gpu(|gpu| expect_same_bits_however_it_is_done(gpu, &lit_box(coloured()), sharing("all")));
 }

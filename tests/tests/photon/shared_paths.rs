@@ -90,41 +90,43 @@ fn direct_light_from_the_map_is_not_shared() {
     });
 }
 
+/// Fails unless pictures by these settings have the same bits in each run, in parts, from a map by the host and from a queue, and others without eye paths that go on.
+pub(super) fn expect_same_bits_however_it_is_done(gpu: &Gpu, scene: &Scene, settings: PhotonSettings) {
+    let usual = PhotonSettings {
+        photons: 1 << 10,
+        reduction: 2.0 / 3.0,
+        ..settings
+    };
+    let made = |settings: &PhotonSettings| bits(&photons(gpu, scene, settings, 3));
+    let truth = made(&usual);
+    assert_eq!(made(&usual), truth, "two runs");
+    let in_parts = PhotonSettings {
+        submission_work: 1 << 12,
+        ..usual.clone()
+    };
+    assert_eq!(made(&in_parts), truth, "in short submissions");
+    let by_host = PhotonSettings {
+        map_build: MapBuild::Host,
+        ..usual.clone()
+    };
+    assert_eq!(made(&by_host), truth, "a map by the host");
+    let (queue, query) = FORMS[1];
+    let queued = PhotonSettings {
+        queue,
+        query,
+        ..usual.clone()
+    };
+    assert_eq!(made(&queued), truth, "from a queue");
+    let alone = PhotonSettings {
+        volume_paths: false,
+        ..usual
+    };
+    assert_ne!(made(&alone), truth, "without eye paths");
+}
+
 #[test]
 fn shares_have_the_same_bits_however_it_is_done() {
-    with_gpu(|gpu| {
-        let scene = lit_box(uneven(coloured()));
-        let usual = PhotonSettings {
-            photons: 1 << 10,
-            reduction: 2.0 / 3.0,
-            ..sharing("all")
-        };
-        let made = |settings: &PhotonSettings| bits(&photons(gpu, &scene, settings, 3));
-        let truth = made(&usual);
-        assert_eq!(made(&usual), truth, "two runs");
-        let in_parts = PhotonSettings {
-            submission_work: 1 << 12,
-            ..usual.clone()
-        };
-        assert_eq!(made(&in_parts), truth, "in short submissions");
-        let by_host = PhotonSettings {
-            map_build: MapBuild::Host,
-            ..usual.clone()
-        };
-        assert_eq!(made(&by_host), truth, "a map by the host");
-        let (queue, query) = FORMS[1];
-        let queued = PhotonSettings {
-            queue,
-            query,
-            ..usual.clone()
-        };
-        assert_eq!(made(&queued), truth, "from a queue");
-        let alone = PhotonSettings {
-            volume_paths: false,
-            ..usual
-        };
-        assert_ne!(made(&alone), truth, "without eye paths");
-    });
+    with_gpu(|gpu| expect_same_bits_however_it_is_done(gpu, &lit_box(uneven(coloured())), sharing("all")));
 }
 
 #[test]

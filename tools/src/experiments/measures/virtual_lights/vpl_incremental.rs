@@ -17,7 +17,7 @@ use glam::{DVec3, Vec3};
 use super::vpl_receiver::{self, Receiver};
 use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, geometric_mean, rows};
 use crate::experiments::measures::Context;
-use crate::experiments::measures::pictures::{Panel, light_panel, mean_of, tiled};
+use crate::experiments::measures::pictures::{Panel, finished, light_panel, mean_of, tiled};
 use crate::experiments::reference::short_name;
 
 /// Scenes, whether the lamp is a spot, where it begins and how far it goes on in a frame, as shares of the box around each.
@@ -286,8 +286,7 @@ pub(super) fn oracle(gpu: &Gpu, scene: &Arc<GpuScene>, subject: &Subject, form: 
 /// The oracle's picture of the scene as it is.
 pub(super) fn traced(oracle: &mut PathTracer, form: Form, seed: u32) -> Result<Vec<f32>> {
     oracle.restart(seed)?;
-    oracle.render(form.oracle)?;
-    let (picture, _) = oracle.picture()?;
+    let picture = finished(oracle, form.oracle)?;
     Ok(picture.require(picture::RADIANCE)?.values().to_vec())
 }
 
