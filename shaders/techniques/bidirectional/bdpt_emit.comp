@@ -8,7 +8,7 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
-#include "techniques/bidirectional/bdpt_states.glsl"
+#include "techniques/bidirectional/bdpt_walk_states.glsl"
 #include "walk/wave.glsl"
 #include "transport/emission.glsl"
 

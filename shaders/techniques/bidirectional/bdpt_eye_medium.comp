@@ -14,7 +14,7 @@ layout(local_size_x = 64) in;
 #include "transport/features.glsl"
 #include "transport/media_features.glsl"
 #include "techniques/bidirectional/bdpt_media_set.glsl"
-#include "techniques/bidirectional/bdpt_states.glsl"
+#include "techniques/bidirectional/bdpt_walk_states.glsl"
 #include "walk/hand_on.glsl"
 #include "techniques/bidirectional/bdpt_lights.glsl"
 

@@ -10,8 +10,8 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
-#include "techniques/bidirectional/bdpt_states.glsl"
-#include "techniques/bidirectional/bdpt_vertex.glsl"
+#include "techniques/bidirectional/bdpt_walk_states.glsl"
+#include "techniques/bidirectional/bdpt_new_vertex.glsl"
 #include "walk/hand_on.glsl"
 #include "techniques/bidirectional/bdpt_both_ways.glsl"
 #include "transport/adjoint_ratio.glsl"

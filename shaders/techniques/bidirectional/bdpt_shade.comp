@@ -9,7 +9,7 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
-#include "techniques/bidirectional/bdpt_states.glsl"
+#include "techniques/bidirectional/bdpt_walk_states.glsl"
 #include "techniques/path/path_slots.glsl"
 #include "walk/hand_on.glsl"
 #include "techniques/bidirectional/bdpt_lights.glsl"

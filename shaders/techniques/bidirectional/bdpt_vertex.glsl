@@ -12,7 +12,6 @@
 #include "maps/octahedron.glsl"
 #include "techniques/bidirectional/bdpt_set.glsl"
 #include "transport/bodies.glsl"
-#include "walk/wave.glsl"
 
 // Where a walk's group lies in its history.
 const uint LIGHT_GROUP_SHIFT = 16u;
@@ -38,15 +37,6 @@ uint pack_history(uint bounce, uint group, uint states) {
         return bounce | group << LIGHT_STATES_GROUP_SHIFT | states << LIGHT_STATES_SHIFT;
     }
     return bounce | group << LIGHT_GROUP_SHIFT;
-}
-
-// Lets a vertex wait at a place: on a surface, by barycentric coordinates and triangle, or with a medium at a position.
-void store_light_vertex(uint place, uvec3 at, uint medium, uint history, WalkState walk, PartialWeights weights) {
-    uvec3 way = floatBitsToUint(walk.direction);
-    if (HAS_MEDIA) {
-        way = uvec3(floatBitsToUint(octahedron_encode(walk.direction)), medium == NO_MEDIUM ? 0u : medium + 1u);
-    }
-    store_waiting(place, uvec4(at, history), floatBitsToUint(vec4(walk.throughput, weights.d_vcm)), uvec4(way, floatBitsToUint(weights.d_vc)));
 }
 
 LightVertex load_light_vertex(uint index) {

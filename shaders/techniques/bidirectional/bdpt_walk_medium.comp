@@ -14,8 +14,8 @@ layout(local_size_x = 64) in;
 #include "transport/features.glsl"
 #include "transport/media_features.glsl"
 #include "techniques/bidirectional/bdpt_media_set.glsl"
-#include "techniques/bidirectional/bdpt_states.glsl"
-#include "techniques/bidirectional/bdpt_vertex.glsl"
+#include "techniques/bidirectional/bdpt_walk_states.glsl"
+#include "techniques/bidirectional/bdpt_new_vertex.glsl"
 
 layout(push_constant, scalar) uniform Push {
     WalkKey key;       // the sequence is the pass, places in it walks
