@@ -25,7 +25,7 @@ mod wave;
 pub use arrival::{ArrivalStage, Places, StoppedPlaces};
 pub use in_flight::{Fetches, Walked, WaveInFlight};
 pub use stages::{Refill, WalkStages};
-pub(crate) use trace::work_least;
+pub(crate) use trace::{grid_walk_iterations, work_least};
 pub use trace::{RAY_QUOTA, ray_quota};
 pub use turnover::Turnover;
 pub use walker::{Bounce, WalkOptions, Walker};
