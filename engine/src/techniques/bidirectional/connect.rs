@@ -72,12 +72,7 @@ impl Connect {
 }
 
 impl ConnectKernel {
-    fn on_surfaces(
-        gpu: &Gpu,
-        scene: &GpuScene,
-        is_parallel: bool,
-        settings: &BidirectionalSettings,
-    ) -> Result<Self> {
+    fn on_surfaces(gpu: &Gpu, scene: &GpuScene, is_parallel: bool, settings: &BidirectionalSettings) -> Result<Self> {
         let traversal = scene.index_traversal();
         let spec = surface_spec!(bdpt_connect, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,

@@ -364,8 +364,20 @@ mod tests {
         let arrived = emitted.mis_arrive(4.0, 1.0);
         assert_eq!(arrived, PartialWeights { d_vcm: 16.0, d_vc: 0.0 });
         let scattered = arrived.mis_scatter(1.0, 0.125, 0.125);
-        assert_eq!(scattered, PartialWeights { d_vcm: 8.0, d_vc: 128.0 });
-        assert_eq!(scattered.mis_arrive(9.0, 1.0), PartialWeights { d_vcm: 72.0, d_vc: 128.0 });
+        assert_eq!(
+            scattered,
+            PartialWeights {
+                d_vcm: 8.0,
+                d_vc: 128.0
+            }
+        );
+        assert_eq!(
+            scattered.mis_arrive(9.0, 1.0),
+            PartialWeights {
+                d_vcm: 72.0,
+                d_vc: 128.0
+            }
+        );
     }
 
     #[test]
