@@ -32,7 +32,8 @@ const uint LOOK_UP_LIGHT_BACK = 2u;        // at the light's vertex, from the ey
 const uint LOOK_UP_LIGHT = 3u;             // there, on to the eye
 const uint LOOK_UP_EYE_GLOSSY = 4u;        // of path sets with an automaton also by the other class of lobes
 const uint LOOK_UP_LIGHT_BACK_GLOSSY = 5u;
-const uint LOOK_UPS = HAS_PATH_AUTOMATON ? 6u : 4u;
+const uint LOOK_UPS = 4u;
+const uint LOOK_UPS_OF_STATES = 6u;
 
 // Where the path of an invocation has arrived.
 struct Receiver {
@@ -121,7 +122,7 @@ vec3 connection(Receiver r, LightVertex vertex, out ShadowWay shadow) {
             lit_glossy = look_up == LOOK_UP_LIGHT_BACK_GLOSSY ? found.rgb : lit_glossy;
         }
         look_up += 1u;
-    } while (look_up < LOOK_UPS);
+    } while (look_up < (HAS_PATH_AUTOMATON ? LOOK_UPS_OF_STATES : LOOK_UPS));
     float cos_there = end_cos(there, vertex.medium, wi);
     vec3 both = here.rgb * lit.rgb;
     if (HAS_PATH_AUTOMATON) {

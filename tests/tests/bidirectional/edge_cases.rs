@@ -207,7 +207,7 @@ fn what_cannot_be_modelled_is_refused_by_name() {
         for (settings, word) in [
             (serde_json::json!({ "connections": 0 }), "setting connections: 0"),
             (serde_json::json!({ "light_paths": 100_000 }), "setting light_paths"),
-            (serde_json::json!({ "path_set": "LXE" }), "path_set"),
+            (serde_json::json!({ "path_set": "LXE" }), "LXE"),
         ] {
             let error = start(&lit_room(), settings).to_string();
             assert!(error.contains(word), "{error}");
