@@ -146,7 +146,12 @@ fn bidirectional_paths_take_the_cases_of_materials_as_documented() {
 
 #[test]
 fn bidirectional_paths_take_the_other_cases_as_documented() {
-    check_some_alone("bdpt", |case| !OF_MATERIALS.contains(&case.name));
+    check_some_alone("bdpt", |case| !OF_MATERIALS.contains(&case.name) && !case.of_media);
+}
+
+#[test]
+fn bidirectional_paths_take_the_cases_of_media_as_documented() {
+    check_some_alone("bdpt", |case| case.of_media);
 }
 
 #[test]

@@ -147,6 +147,12 @@ impl TracePipelines {
     }
 }
 
+/// Loop iterations that a quota lets a walk through a grid take, in a subgroup whose lanes take turns at worst in the loop over blocks, where each unit of the quota is one. The loop around it, over
+/// tentative collisions, is the same for all lanes. The pass that ends a loop counts too.
+pub(crate) const fn grid_walk_iterations(lanes: u32, quota: u32) -> u32 {
+    (lanes + 1) * (quota + 1)
+}
+
 /// Loop iterations of a ray from which on they count as work of a submission: atomics are cheap beside them on software devices, where rays are slow.
 pub(crate) fn work_least(kind: DeviceKind) -> u32 {
     match kind {

@@ -21,14 +21,23 @@ Arrival arrival_from(Arrival a, vec3 wo) {
 // Cosine to the geometric normal, for densities per area.
 float surface_cos(Arrival a, vec3 w) { return max(abs(dot(w, a.surface.geometric_normal)), MIS_COS_MIN); }
 
-// f |cos| of light from wi to an eye at wo (rgb), and the density with which a walk from wo goes on to wi (a); without deltas.
-vec4 scattering(Arrival a, vec3 wo, vec3 wi) {
+// f |cos| of light from wi to an eye at wo (rgb) by some lobes, and the density with which a walk from wo goes on to wi (a), by whichever; without deltas.
+vec4 scattering_by(Arrival a, vec3 wo, vec3 wi, uint lobes) {
     Arrival seen = arrival_from(a, wo);
     ScatteringFrame frame = scattering_frame(seen, arrival_normal(seen));
     if (!sides_agree(frame.z, frame.outward, wi)) {
         return vec4(0.0);
     }
-    return bsdf_eval_pdf(seen.bsdf, frame.wo, world_to_frame(frame, wi), LOBE_ALL);
+    return bsdf_eval_part(seen.bsdf, frame.wo, world_to_frame(frame, wi), LOBE_ALL, lobes);
+}
+
+// By all.
+vec4 scattering(Arrival a, vec3 wo, vec3 wi) { return scattering_by(a, wo, wi, LOBE_ALL); }
+
+// Of a surface the lobes of a class, LOBE_DIFFUSE or LOBE_GLOSSY, that scatter between two directions away from it: reflections, or those that let light through.
+uint lobes_between(Arrival a, vec3 u, vec3 v, uint lobes) {
+    float sides = dot(u, a.surface.geometric_normal) * dot(v, a.surface.geometric_normal);
+    return lobes & (sides > 0.0 ? LOBE_REFLECTION : LOBE_TRANSMISSION);
 }
 
 // Probability with which bsdf_sample chooses a delta lobe.

@@ -8,7 +8,7 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
-#include "techniques/bidirectional/bdpt_set.glsl"
+#include "techniques/bidirectional/bdpt_walk_states.glsl"
 #include "walk/wave.glsl"
 #include "transport/emission.glsl"
 
@@ -42,7 +42,7 @@ void main() {
     uvec2 point = sampler_bits(walk_sampler(slot, DIMENSION_START_POINT));
     Emission e = emit(point, sampler_bits(walk_sampler(slot, DIMENSION_START_DIRECTION)), push.scene_lower, push.scene_upper, push.radius);
     // Walks from the lights have no use for a density: whether they come from infinity stands there.
-    walk_states_out[slot] = WalkState(e.origin, 1.0, normalize(e.direction), 0u, e.power, e.infinite ? 1.0 : 0.0);
+    walk_states_out[slot] = WalkState(e.origin, states_of_walk(accepting_states()), normalize(e.direction), 0u, e.power, e.infinite ? 1.0 : 0.0);
     walk_gathered[slot] = GatheredLight(vec3(0.0), e.interior);
     subpath_weights[slot] = mis_bounded(emitted_weights(e));
 }

@@ -6,8 +6,8 @@
 #include "techniques/bidirectional/bdpt_both_ways.glsl"
 #include "techniques/bidirectional/bdpt_set.glsl"
 
-// Where the path in a slot has arrived, its ray `way` long.
-PartialWeights eye_weights(uint slot, WalkState path, Arrival a, float way) {
+// Where the path in a slot has arrived under a cosine, its ray `way` long.
+PartialWeights eye_weights_under(uint slot, WalkState path, float cos_here, float way) {
     PartialWeights w = subpath_weights[slot];
     float squared = way * way;
     if (path.bounce == 0u) {
@@ -16,7 +16,10 @@ PartialWeights eye_weights(uint slot, WalkState path, Arrival a, float way) {
         w = PartialWeights(push.camera_measure * cos_camera * cos_camera * cos_camera, 0.0);
         squared = PARALLEL_CAMERA ? 1.0 : squared;
     }
-    return mis_arrive(w, squared, surface_cos(a, a.wo));
+    return mis_arrive(w, squared, cos_here);
 }
+
+// At a surface.
+PartialWeights eye_weights(uint slot, WalkState path, Arrival a, float way) { return eye_weights_under(slot, path, surface_cos(a, a.wo), way); }
 
 #endif

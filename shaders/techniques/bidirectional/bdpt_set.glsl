@@ -20,25 +20,8 @@ const uint STRATEGY_SPLATS = 4u;
 layout(constant_id = 50) const uint STRATEGY = STRATEGY_COMBINED;
 layout(constant_id = 51) const bool PARALLEL_CAMERA = false;  // orthographic
 
-// Quarters of a vertex:
-// - barycentric coordinates, triangle, group of its walk and scatterings before;
-// - power that arrives, W, as if its walk were the only one, and d_vcm;
-// - the way it came, unit, and d_vc.
+// Quarters of a vertex (bdpt_vertex.glsl).
 const uint LIGHT_VERTEX_QUARTERS = 3u;
-
-// Where a walk's group lies in the word of its number of scatterings.
-const uint LIGHT_GROUP_SHIFT = 16u;
-
-// Walks of a pass are in as many groups as pixels have samples in it: what those of a group show the camera belongs to one sample of each pixel.
-struct LightVertex {
-    vec2 barycentrics;
-    uint triangle;
-    uint group;
-    uint bounce;
-    vec3 power;
-    vec3 direction;
-    PartialWeights weights;
-};
 
 // Stand for the pixel of a vertex that shows the camera nothing, and of one whose shadow ray goes on.
 const uint SPLAT_NONE = 0xFFFFFFFFu;
@@ -74,14 +57,9 @@ layout(set = 3, binding = 4, scalar) restrict buffer BidirectionalCounters {
 } bdpt_counters;
 layout(set = 3, binding = 5, scalar) restrict buffer LightSplats { LightSplat light_splats[]; };  // by vertex
 layout(set = 3, binding = 6, scalar) restrict buffer SplatSums { SplatSum splat_sums[]; };        // by group, then pixel
-
-LightVertex load_light_vertex(uint index) {
-    int first = int(LIGHT_VERTEX_QUARTERS * index);
-    uvec4 q0 = texelFetch(light_vertex_texels, first);
-    vec4 q1 = uintBitsToFloat(texelFetch(light_vertex_texels, first + 1));
-    vec4 q2 = uintBitsToFloat(texelFetch(light_vertex_texels, first + 2));
-    return LightVertex(uintBitsToFloat(q0.xy), q0.z, q0.w >> LIGHT_GROUP_SHIFT, q0.w & ((1u << LIGHT_GROUP_SHIFT) - 1u), q1.xyz, q2.xyz, PartialWeights(q1.w, q2.w));
-}
+// Of path sets that are more than a range of bounces: successors of each state, and behind these the states in which light counts, a bit each (transport/path_set.glsl). Elsewhere some
+// other buffer is bound, and nothing is read.
+layout(set = 3, binding = 7, scalar) restrict readonly buffer BidirectionalStates { uint bdpt_states[]; };
 
 // Bits of the greatest splat in steps: with 2^22 splats a pixel's sum stays within 64 bits.
 const int SPLAT_BITS = 40;

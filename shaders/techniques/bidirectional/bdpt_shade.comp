@@ -1,6 +1,6 @@
 #version 460
 // Where eye subpaths have arrived: the lamp that they meet and one that they sample, each weighted against all other ways to make the path, and one direction more.
-// Shadow rays go to walk/shadow.comp; bdpt_connect.comp joins them to light subpaths before.
+// Shadow rays go to walk/shadow.comp; bdpt_connect.comp joins them to light subpaths before. In scenes with media what happens on the way comes before (bdpt_eye_medium.comp).
 //
 // Veach 1997, 10; I. Georgiev, "Implementing Vertex Connection and Merging", 2012. Unbiased.
 #extension GL_GOOGLE_include_directive : require
@@ -9,10 +9,11 @@
 layout(local_size_x = 64) in;
 
 #include "transport/features.glsl"
-#include "techniques/bidirectional/bdpt_set.glsl"
+#include "techniques/bidirectional/bdpt_walk_states.glsl"
 #include "techniques/path/path_slots.glsl"
 #include "walk/hand_on.glsl"
 #include "techniques/bidirectional/bdpt_lights.glsl"
+#include "transport/bsdf_label.glsl"
 
 layout(push_constant, scalar) uniform Push {
     vec3 scene_lower;
@@ -28,6 +29,7 @@ layout(push_constant, scalar) uniform Push {
 } push;
 
 #include "techniques/bidirectional/bdpt_eye.glsl"
+#include "techniques/bidirectional/bdpt_strategy.glsl"
 #include "techniques/path/path_roulette.glsl"
 #include "walk/draws.glsl"
 
@@ -37,20 +39,13 @@ const uint LOOK_UP_LIGHT = 0u;       // of light that is sampled
 const uint LOOK_UP_LIGHT_BACK = 1u;  // of the way back from there
 const uint LOOK_UP_BACK = 2u;        // of the way back from the direction that is sampled
 
-const bool HAS_LIGHTS = HAS_AREA_LIGHTS || HAS_ENVIRONMENT || HAS_PUNCTUAL_LIGHTS;
-
-bool counts(uint bounces) { return bounces >= push.least_bounces && bounces <= push.most_bounces; }
-
-// Weight of what one strategy has found, whose other ways weigh so much.
-float strategy_weight(uint strategy, float to_light, float to_eye) {
-    return STRATEGY == STRATEGY_COMBINED ? mis_weight(to_light, to_eye) : (STRATEGY == strategy ? 1.0 : 0.0);
-}
-
 // Shades the hit of the path in a slot. What it meets is added to `radiance`; `flags` say what waits at the place, and whether the path goes on.
 void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uint flags) {
     Hit hit = load_hit(place);
+    uint state = take_path_state(path);
+    bool counted = counts(path.bounce) && state_accepts(state);
     if (hit.triangle == NO_HIT) {
-        if (HAS_ENVIRONMENT && counts(path.bounce)) {
+        if (HAS_ENVIRONMENT && counted) {
             SceneEnvironment e = load_environment();
             vec3 local = world_to_environment(e, path.direction);
             float others = 0.0;
@@ -65,11 +60,13 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     }
     Arrival a = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
     Surface s = a.surface;
-    uint interior = arrival_interior(a, HAS_TRANSMISSION ? walk_gathered[slot].interior : OUTSIDE);
-    path.throughput = absorbed(path.throughput, interior, hit.t);
+    uint interior = arrival_interior(a, HAS_TRANSMISSION || HAS_MEDIA ? walk_gathered[slot].interior : OUTSIDE);
+    if (!HAS_MEDIA) {
+        path.throughput = absorbed(path.throughput, interior, hit.t);
+    }
     PartialWeights weights = eye_weights(slot, path, a, hit.t);
 
-    if ((HAS_AREA_LIGHTS || HAS_UNLIT) && counts(path.bounce)) {
+    if ((HAS_AREA_LIGHTS || HAS_UNLIT) && counted) {
         vec3 emission = surface_emission(a.material, s, a.wo);
         if (emission != vec3(0.0)) {
             float others = 0.0;
@@ -94,7 +91,12 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
 
     LightSample light = no_light();
     float emitted = 0.0;
-    bool lit = HAS_LIGHTS && counts(bounce + 1u);
+    // Lobes by which light counts.
+    uint lit_lobes = LOBE_ALL;
+    if (HAS_PATH_AUTOMATON) {
+        lit_lobes = lobes_into(state, accepting_states()) & LOBE_ALL;
+    }
+    bool lit = HAS_LIGHTS && counts(bounce + 1u) && lit_lobes != 0u;
     if (lit) {
         light = sample_emission(s.point.position, bounce_words(slot, bounce, DIMENSION_LIGHT), push.disk_pdf, push.scene_lower, push.scene_upper, emitted);
         lit = light.radiance != vec3(0.0);
@@ -109,7 +111,9 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     uint look_up = HAS_LIGHTS ? LOOK_UP_LIGHT : LOOK_UP_BACK;
     do {
         vec3 from = look_up == LOOK_UP_LIGHT ? a.wo : (look_up == LOOK_UP_LIGHT_BACK ? light.direction : wi);
-        vec4 found = scattering(a, from, look_up == LOOK_UP_LIGHT ? light.direction : a.wo);
+        bool forwards = look_up == LOOK_UP_LIGHT;
+        uint lobes = HAS_PATH_AUTOMATON && forwards ? lit_lobes : LOBE_ALL;
+        vec4 found = scattering_by(a, from, forwards ? light.direction : a.wo, lobes);
         to_light = look_up == LOOK_UP_LIGHT ? found : to_light;
         from_light = look_up == LOOK_UP_LIGHT_BACK ? found.a : from_light;
         back = found.a;
@@ -134,15 +138,26 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
         }
         ray.origin = start;
         ray.contribution = path.throughput * light.radiance * to_light.rgb * weight;
-        if (!light.infinite) {
-            uint passed = a.solid ? (dot(wl, frame.outward) < 0.0 ? s.material : OUTSIDE) : interior;
+        uint around = HAS_MEDIA ? s.around : OUTSIDE;
+        uint passed = a.solid ? (dot(wl, frame.outward) < 0.0 ? s.material : around) : interior;
+        if (!HAS_MEDIA && !light.infinite) {
             ray.contribution = absorbed(ray.contribution, passed, distance(s.point.position, light.point.position));
         }
         if (weight > 0.0) {
-            flags |= store_shadow_ray(place, ray, OUTSIDE, 0.0);
+            float left_out = HAS_MEDIA ? way_left_out(s, start, wl) / length(ray.direction) : 0.0;
+            flags |= store_shadow_ray(place, ray, passed, -left_out);
         }
     }
 
+    if (HAS_PATH_AUTOMATON && scattered.flags != 0u) {
+        uint after_base = state_behind(state, LOBE_DIFFUSE & LOBE_REFLECTION);
+        uint after_microfacets = state_behind(state, LOBE_GLOSSY & LOBE_REFLECTION);
+        scattered = bsdf_label(a.bsdf, frame.wo, scattered, LOBE_ALL, after_base == after_microfacets, side.y);
+        state = state_behind(state, scattered.flags);
+        if (state == PATH_SET_DEAD) {
+            return;
+        }
+    }
     path.throughput *= scattered.weight;
     if (scattered.flags == 0u || !sides_agree(frame.z, frame.outward, wi) || path.throughput == vec3(0.0)) {
         return;
@@ -150,7 +165,7 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     if (HAS_TRANSMISSION && (scattered.flags & LOBE_TRANSMISSION) != 0u && (a.bsdf.flags & BSDF_THIN) == 0u) {
         float eta = frame.wo.z > 0.0 ? a.bsdf.eta : 1.0 / a.bsdf.eta;
         path.eta_scale *= eta * eta;
-        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : OUTSIDE;
+        walk_gathered[slot].interior = frame.wo.z > 0.0 ? s.material : HAS_MEDIA ? s.around : OUTSIDE;
     }
     path.bounce = bounce + 1u;
     if (!path_roulette(path, side.y)) {
@@ -165,7 +180,8 @@ void shade(uint slot, uint place, WalkState path, inout vec3 radiance, inout uin
     path.origin = departure(a, wi, path.throughput);
     path.direction = normalize(wi);
     path.pdf = scattered.pdf;
-    flags |= store_walk(slot, path, 0.0);
+    put_path_state(path, state);
+    flags |= store_walk(slot, path, HAS_MEDIA ? -way_left_out(s, path.origin, path.direction) : 0.0);
 }
 
 void main() {
@@ -177,6 +193,13 @@ void main() {
     vec3 radiance = vec3(0.0);
     uint flags = 0u;
     WalkState path = load_walk(slot);
+    if (HAS_MEDIA) {
+        MediumEvent event = walk_medium_events[place];
+        if ((event.flags & EVENT_HANDLED) != 0u) {
+            return;
+        }
+        path.throughput *= event.weight;
+    }
     shade(slot, place, path, radiance, flags);
     if (radiance != vec3(0.0)) {
         walk_gathered[slot].radiance += radiance;

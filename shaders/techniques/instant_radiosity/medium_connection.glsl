@@ -10,22 +10,12 @@
 #include "techniques/instant_radiosity/connection.glsl"
 #include "scene/media.glsl"
 #include "transport/phase.glsl"
-
-// Iterations of a shadow ray's walk through a grid in one stretch. Each has as many, so that where walks stop does not depend on how many stretches share a dispatch; few, since
-// those of all lanes and stretches add up to what software drivers run.
-const uint CONNECTION_GRID_QUOTA = 64u;
+#include "walk/medium_ray_state.glsl"
 
 // A point that virtual lights light: of a collision the position, the way there and the body are known alone, and the frame is none.
 struct MediumReceiver {
     Receiver at;
     uint medium;  // of the collision, or NO_MEDIUM on a surface
-};
-
-// A way between a point and a virtual light, before anything of it is known.
-struct ShadowWay {
-    Ray ray;
-    uint interior;  // body that it begins in, or OUTSIDE
-    float start;    // in lengths of the ray's direction: 0, or negative by what the offset of its origin left out
 };
 
 // Density per sr with which a medium scatters between propagation directions.

@@ -21,6 +21,7 @@ layout(local_size_x = 64) in;
 #include "walk/wave.glsl"
 #include "transport/path_set.glsl"
 #include "walk/media.glsl"
+#include "walk/medium_ray_state.glsl"
 #include "wide_counter.glsl"
 
 layout(constant_id = 22) const bool HAS_AIRLIGHT = true;  // eye paths take equi-angular samples
@@ -45,14 +46,9 @@ layout(push_constant, scalar) uniform Push {
 // What a place has had of the lights, where it goes on.
 struct MediumGatherState {
     vec3 sum;
-    uint light;          // the next one, or whose ray is under way
-    vec3 transmittance;  // of that ray so far
-    uint cursor;         // where the search of its next surface goes on
-    Hit hit;
-    float start;         // as in ShadowState
-    uint interior;       // body that the stretch is in, or OUTSIDE
-    uint begun;          // 1 where a ray is under way
-    uint grid_walks;     // of that ray so far
+    uint light;     // the next one, or whose ray is under way
+    MediumRay ray;
+    uint begun;     // 1 where a ray is under way
 };
 
 layout(set = 3, binding = 0) uniform utextureBuffer virtual_light_texels;
@@ -72,11 +68,10 @@ layout(set = 3, binding = 6) uniform textureBuffer media_majorants;
 
 #define CLERESTORY_CANDIDATE_FILTER HAS_ALPHA
 #include "accel/index.glsl"
+#include "walk/medium_ray.glsl"
 
 // Tells the walks of these rays through grids from those of the paths' own.
 const uint RATIO_SEED = 0x76706c74u;
-// Random numbers of a walk through a grid, as a power of two; those of the next begin behind them.
-const uint RATIO_WALK_SHIFT = 16u;
 
 // What virtual lights leave to be gathered at a distance of t from where the path was scattered last, whose light they have up to the bound.
 float gathered_share(uint slot, WalkState path, float cos_here, float t) {
@@ -177,51 +172,6 @@ bool begin_receiver(uint slot, uint place, out MediumReceiver r) {
     return r.at.throughput != vec3(0.0);
 }
 
-// Takes the stretch up to the next surface, to which the way has been searched, or of a grid as much as a walk's quota allows; true when the ray has ended, its
-// transmittance known. `key` is that of the ray's walks through grids.
-bool pass_stretch(Ray ray, uvec4 key, inout MediumGatherState at) {
-    bool met = at.hit.triangle != NO_HIT;
-    Crossing crossing = Crossing(at.interior, OUTSIDE, false);
-    if (met) {
-        crossing = cross_surface(at.hit.triangle, ray.direction, at.interior);
-        if (!crossing.boundary) {
-            at.transmittance = vec3(0.0);
-            return true;
-        }
-    }
-    float scale = length(ray.direction);
-    float way = max(at.hit.t - at.start, 0.0) * scale;
-    uint medium = medium_inside(crossing.interior, push.surrounding);
-    if (medium != NO_MEDIUM) {
-        SceneMedium m = load_medium(medium);
-        if (HAS_HOMOGENEOUS && !(HAS_GRIDS && m.has_grid != 0u)) {
-            at.transmittance *= transmittance(m.sigma_t, way);
-        } else if (HAS_GRIDS) {
-            GridWalk walk = begin_grid_walk(m, ray.origin, ray.direction, at.start, at.hit.t);
-            walk.draw = at.grid_walks << RATIO_WALK_SHIFT;
-            ++at.grid_walks;
-            uint iterations = CONNECTION_GRID_QUOTA;
-            uint outcome = ratio_tracking(m, key, scale, walk, iterations, at.transmittance);
-            float reached = resumed_start(at.start, walk.entry + walk.t);
-            // The search that goes on from the surface itself would miss it.
-            if (outcome == GRID_STOPPED && reached < at.hit.t) {
-                at.start = reached;
-                at.cursor = INDEX_START;
-                at.hit = no_hit(ray.t_max);
-                return false;
-            }
-        }
-    }
-    if (HAS_ABSORPTION && crossing.interior != OUTSIDE) {
-        at.transmittance *= transmittance(load_material(crossing.interior).absorption, way);
-    }
-    at.start = past_surface(at.hit.t);
-    at.interior = crossing.beyond;
-    at.cursor = INDEX_START;
-    at.hit = no_hit(ray.t_max);
-    return !met || at.transmittance == vec3(0.0);
-}
-
 // Goes on with the lights of a place.
 void gather(MediumReceiver r, inout MediumGatherState at, out uint rays) {
     rays = 0u;
@@ -236,22 +186,15 @@ void gather(MediumReceiver r, inout MediumGatherState at, out uint rays) {
             if (at.begun == 0u) {
                 ++rays;
                 at.begun = 1u;
-                at.transmittance = vec3(1.0);
-                at.cursor = INDEX_START;
-                at.hit = no_hit(shadow.ray.t_max);
-                at.start = shadow.start;
-                at.interior = shadow.interior;
-                at.grid_walks = 0u;
+                at.ray = begin_medium_ray(shadow);
             }
             if (HAS_ALPHA) {
                 candidate_key = connection_words(r.at, at.light, LIGHT_RAY_SEED);
             }
-            Ray rest = Ray(shadow.ray.origin, search_start(at.start), shadow.ray.direction, shadow.ray.t_max);
-            at.cursor = closest_hit(rest, at.cursor, at.hit);
-            stopped = at.cursor != INDEX_FINISHED;
+            stopped = !search_stretch(shadow.ray, at.ray);
             if (!stopped) {
-                ended = pass_stretch(shadow.ray, connection_words(r.at, at.light, RATIO_SEED), at);
-                at.sum += ended ? found * at.transmittance : vec3(0.0);
+                ended = pass_stretch(shadow.ray, push.surrounding, connection_words(r.at, at.light, RATIO_SEED), at.ray);
+                at.sum += ended ? found * at.ray.transmittance : vec3(0.0);
             }
         }
         if (ended) {
@@ -283,7 +226,7 @@ void main() {
         return;
     }
     MediumGatherState at =
-        MediumGatherState(vec3(0.0), 0u, vec3(1.0), INDEX_START, no_hit(0.0), 0.0, OUTSIDE, 0u, 0u);
+        MediumGatherState(vec3(0.0), 0u, MediumRay(vec3(1.0), INDEX_START, no_hit(0.0), 0.0, OUTSIDE, 0u), 0u);
     if (goes_on) {
         at = medium_gather_states[place];
     } else {

@@ -6,6 +6,8 @@
 
 mod agreement;
 mod edge_cases;
+mod media;
+mod path_sets;
 mod ray_bundles;
 mod strategies;
 

@@ -113,6 +113,7 @@ sources! {
     KUTZ_2021 = "kutz-2021": "P. Kutz, M. Hašan, M. Edmondson", "Novel Aspects of the Adobe Standard Material", "Adobe technical report", 2021;
     LAFORTUNE_WILLEMS_1993 = "lafortune-willems-1993": "E. Lafortune, Y. Willems", "Bi-directional Path Tracing", "Compugraphics", 1993;
     LAFORTUNE_WILLEMS_1994 = "lafortune-willems-1994": "E. Lafortune, Y. Willems", "Using the Modified Phong Reflectance Model for Physically Based Rendering", "Report CW 197, KU Leuven", 1994;
+    LAFORTUNE_WILLEMS_1996 = "lafortune-willems-1996": "E. Lafortune, Y. Willems", "Rendering Participating Media with Bidirectional Path Tracing", "Eurographics Workshop on Rendering", 1996;
     LAGARDE_ZANUTTINI_2012 = "lagarde-zanuttini-2012": "S. Lagarde, A. Zanuttini", "Local Image-based Lighting with Parallax-corrected Cubemaps", "SIGGRAPH Talks", 2012;
     LAINE_2007 = "laine-2007": "S. Laine, H. Saransaari, J. Kontkanen, J. Lehtinen, T. Aila", "Incremental Instant Radiosity for Real-Time Indirect Illumination", "EGSR", 2007;
     LAINE_2010 = "laine-2010": "S. Laine", "Restart Trail for Stackless BVH Traversal", "HPG", 2010;

@@ -9,7 +9,8 @@ use super::splats::sums_within;
 use crate::catalogue::{Role, Row, sources};
 use crate::gpu::interface::ShaderInfo;
 use crate::gpu::shaders::techniques::bidirectional::{
-    bdpt_add, bdpt_append, bdpt_camera, bdpt_connect, bdpt_emit, bdpt_scatter, bdpt_shade, bdpt_splat,
+    bdpt_add, bdpt_append, bdpt_camera, bdpt_connect, bdpt_emit, bdpt_eye_medium, bdpt_medium_camera,
+    bdpt_medium_connect, bdpt_scatter, bdpt_shade, bdpt_splat, bdpt_walk_medium,
 };
 use crate::gpu::shaders::techniques::path::{path_camera, path_resolve};
 use crate::gpu::shaders::walk::{compact_count, compact_scan, compact_scatter, extend, shadow};
@@ -62,20 +63,21 @@ pub(in crate::techniques) const CARD: Card = Card {
     },
 };
 
-/// Light off mirrors onto surfaces that are seen in mirrors alone: nowhere two vertices follow each other that can be joined.
-const BETWEEN_MIRRORS: &str = "LS+([DG]S+)+E";
+/// Light off mirrors onto surfaces, or into media, that are seen in mirrors alone: nowhere two vertices follow each other that can be joined.
+const BETWEEN_MIRRORS: &str = "LS+([DGV]S+)+E";
 const BY_NO_JOINT: &str = "by way of mirrors and smooth glass onto what is seen in such, like caustics behind glass: no subpaths of eye and light can be joined there";
 
 /// Why a scene cannot be modelled.
 pub(super) fn refusals(profile: &SceneProfile) -> Vec<String> {
+    let from_infinity = profile.has_environment() || profile.lights.directional > 0;
     reasons(&[(
-        profile.media.any(),
-        "the scene has participating media, and paths are joined on surfaces only",
+        profile.media.surrounding && from_infinity,
+        "the scene has endless participating media and light from infinity, which no light subpath brings through them",
     )])
 }
 
 /// What a picture may take with default settings, of whatever scene.
-const KERNELS: [&ShaderInfo; 15] = [
+const KERNELS: [&ShaderInfo; 19] = [
     &path_camera::INFO,
     &extend::INFO,
     &shadow::INFO,
@@ -91,6 +93,10 @@ const KERNELS: [&ShaderInfo; 15] = [
     &bdpt_add::INFO,
     &bdpt_connect::INFO,
     &bdpt_shade::INFO,
+    &bdpt_walk_medium::INFO,
+    &bdpt_eye_medium::INFO,
+    &bdpt_medium_connect::INFO,
+    &bdpt_medium_camera::INFO,
 ];
 
 impl Technique for BidirectionalPaths {
@@ -115,6 +121,7 @@ impl Technique for BidirectionalPaths {
             ("light_vertices", c.light_vertices),
             ("vertices_in_view", c.vertices_in_view),
             ("connections", c.connections),
+            ("collisions", c.collisions),
         ])
     }
 
@@ -137,9 +144,9 @@ const BIAS: Bias = Bias::Unbiased;
 const ROWS: &[Row] = &[
     Row {
         id: "CL-BDPT",
-        name: "technique `bdpt`: bidirectional path tracing on surfaces, all ways to make a path weighted by the balance heuristic",
+        name: "technique `bdpt`: bidirectional path tracing on surfaces and in media, all ways to make a path weighted by the balance heuristic",
         role: Role::Technique,
-        limits: "Refuses scenes with media; chooses among many lights by power alone; mirrors and smooth glass are joined to nothing, so that light of sources without area is missing that a mirror or smooth glass throws onto what is seen in another; a light subpath for each pixel and sample up to 65,536 a pass, of which large pictures have less; each sample has light subpaths of its own, which costs where light arrives directly.",
+        limits: "Refuses light from infinity in endless media; chooses among many lights by power alone; mirrors and smooth glass are joined to nothing, so that light of sources without area is missing that a mirror or smooth glass throws onto what is seen in another; a light subpath for each pixel and sample up to 65,536 a pass, of which large pictures have less; each sample has light subpaths of its own, which costs where light arrives directly.",
         sources: &[
             sources::LAFORTUNE_WILLEMS_1993.whole(),
             sources::VEACH_1997.at("chapters 9 and 10"),
@@ -162,6 +169,10 @@ const ROWS: &[Row] = &[
             "tests/tests/bidirectional/agreement.rs::lights_without_area_and_skies_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::materials_of_all_kinds_agree_with_the_path_tracer",
             "tests/tests/bidirectional/agreement.rs::bodies_that_absorb_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/path_sets.rs::expressions_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/path_sets.rs::parts_of_the_light_sum_to_the_whole",
+            "tests/tests/bidirectional/media.rs::fog_agrees_with_the_path_tracer",
+            "engine/src/techniques/bidirectional/settings.rs::path_sets_and_ranges_of_bounces_are_one_set",
             "engine/src/techniques/bidirectional/settings.rs::joints_need_light_subpaths_and_two_scatterings",
             "engine/src/techniques/bidirectional/settings.rs::light_subpaths_are_as_many_as_there_is_room_for_their_vertices",
             "engine/src/techniques/bidirectional/settings.rs::pilots_have_as_many_light_subpaths_a_pixel_as_the_picture",
@@ -176,6 +187,42 @@ const ROWS: &[Row] = &[
             "clerestory render --technique bdpt",
         ],
         ..Row::of("engine/src/techniques/bidirectional/renderer.rs")
+    },
+    Row {
+        id: "CL-BDPT-MEDIA",
+        name: "bidirectional path tracing in media: collisions of eye paths and light subpaths are vertices, joined to each other, to surfaces, lights and the camera through what media let through",
+        role: Role::PartOf("CL-BDPT"),
+        limits: "Weights have phase functions and squared distances, and nothing of free flights: they sum to one in all media, of whatever colour and density, but dense media have more noise than with the probability of flights in them; what media emit is found by eye paths alone; light from infinity in endless media is refused.",
+        sources: &[
+            sources::LAFORTUNE_WILLEMS_1996.whole(),
+            sources::GEORGIEV_2012.whole(),
+            sources::VEACH_1997.at("chapter 10"),
+        ],
+        shaders: &[
+            "shaders/techniques/bidirectional/bdpt_walk_medium.comp",
+            "shaders/techniques/bidirectional/bdpt_eye_medium.comp",
+            "shaders/techniques/bidirectional/bdpt_medium_connect.comp",
+            "shaders/techniques/bidirectional/bdpt_medium_camera.comp",
+            "shaders/techniques/bidirectional/bdpt_ends.glsl",
+            "shaders/walk/flight.glsl",
+            "shaders/walk/medium_ray.glsl",
+        ],
+        bias: Some(BIAS),
+        tests: &[
+            "engine/src/techniques/bidirectional/mis.rs::weights_of_paths_through_media_sum_to_one",
+            "tests/tests/bidirectional/media.rs::fog_agrees_with_the_path_tracer",
+            "tests/tests/bidirectional/media.rs::grids_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/media.rs::bodies_in_fog_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/media.rs::media_that_emit_agree_with_the_path_tracer",
+            "tests/tests/bidirectional/media.rs::furnaces_with_fog_are_even",
+            "tests/tests/bidirectional/media.rs::each_way_to_make_a_path_in_fog_finds_the_same_light",
+            "tests/tests/bidirectional/media.rs::caustics_of_a_tiny_lamp_in_fog_are_those_of_photons",
+            "tests/tests/bidirectional/media.rs::pictures_of_media_do_not_depend_on_how_the_work_is_cut_up",
+            "tests/tests/bidirectional/media.rs::threads_of_the_driver_never_show_in_media",
+            "tests/tests/bidirectional/media.rs::scenes_without_media_have_nothing_of_them",
+            "tests/tests/bidirectional/media.rs::what_media_have_no_light_subpaths_for_is_refused_by_name",
+        ],
+        ..Row::of("engine/src/techniques/bidirectional/light_paths.rs")
     },
     Row {
         id: "CL-LIGHT-SPLATS",
@@ -211,7 +258,7 @@ mod tests {
 
     #[test]
     fn caustics_behind_glass_are_said_to_be_missed_and_those_in_view_are_not() {
-        let missed = |address: &str, wanted: &str| {
+        let missed = |address: &str, wanted: &str| -> Option<String> {
             let scene = scene::load(address).unwrap();
             let profile = SceneProfile::of(&scene);
             (CARD.foresight.misses)(&profile, &scene.lights, &wanted.parse().unwrap()).unwrap()
@@ -219,6 +266,10 @@ mod tests {
         let glass = "builtin:cornell-box?sphere=glass&source=point";
         assert!(missed(glass, "all").expect("missed").contains("point light"));
         assert_eq!(missed(glass, "LS+DE"), None);
+        // In fog light that glass sends there is seen, but for that which is seen through glass.
+        let fog = "builtin:fog-box?sphere=glass&source=point";
+        assert_eq!(missed(fog, "LS+VE"), None);
+        assert!(missed(fog, "LS+VS+E").is_some());
         assert_eq!(missed("builtin:cornell-box?sphere=glass", "all"), None);
     }
 }

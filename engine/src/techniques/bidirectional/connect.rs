@@ -1,23 +1,37 @@
 //! Eye subpaths joined to light subpaths: a stage between arrival and shading. Memory is that of the places, whatever the number of vertices.
 
 use super::eye::EyeMemory;
-use super::kernels::{Counters, check_sweeps, quota_of, rays_of_submission, set_of};
+use super::kernels::{Counters, check_sweeps, media_set_of, quota_of, rays_of_submission, stretches_of};
 use super::settings::BidirectionalSettings;
 use crate::Result;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::WALK_GROUP;
-use crate::gpu::shaders::sets::{BidirectionalSet, WaveSet};
-use crate::gpu::shaders::techniques::bidirectional::bdpt_connect;
-use crate::gpu::{Access, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};
+use crate::gpu::shaders::constants::{NO_MEDIUM, WALK_GROUP};
+use crate::gpu::shaders::sets::{BidirectionalMediaSet, BidirectionalSet, WaveSet};
+use crate::gpu::shaders::techniques::bidirectional::{bdpt_connect, bdpt_medium_connect};
+use crate::gpu::{Access, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{ArrivalStage, Places, StoppedPlaces, WalkKey, stage_barrier};
 
 /// The kernel of connections.
 pub(super) struct Connect {
-    pipeline: ComputePipeline<bdpt_connect::Kernel>,
+    kernel: ConnectKernel,
     connections: u32,
     bounces: [u32; 2],
     rays_at_once: u32,
+}
+
+enum ConnectKernel {
+    Surfaces(ComputePipeline<bdpt_connect::Kernel>),
+    /// In scenes with media.
+    Media(ComputePipeline<bdpt_medium_connect::Kernel>),
+}
+
+/// The places of a dispatch.
+enum Over<'a> {
+    /// All of the queue, by indirect arguments.
+    All(BufferView<'a>),
+    /// So many from that one on, which have stopped.
+    Stopped { first: u32, count: u32 },
 }
 
 /// Connections to the light subpaths of a pass, to be recorded with a wave of eye paths.
@@ -36,11 +50,36 @@ pub(super) struct ConnectStage<'a> {
 
 impl Connect {
     pub fn new(gpu: &Gpu, scene: &GpuScene, is_parallel: bool, settings: &BidirectionalSettings) -> Result<Self> {
+        let kernel = if scene.profile().media.any() {
+            ConnectKernel::in_media(gpu, scene, is_parallel, settings)?
+        } else {
+            ConnectKernel::on_surfaces(gpu, scene, is_parallel, settings)?
+        };
+        Ok(Self {
+            kernel,
+            connections: settings.connections,
+            bounces: settings.bounces(),
+            rays_at_once: rays_of_submission(gpu),
+        })
+    }
+
+    pub fn pipeline(&self) -> PipelineInfo {
+        match &self.kernel {
+            ConnectKernel::Surfaces(kernel) => kernel.info(),
+            ConnectKernel::Media(kernel) => kernel.info(),
+        }
+    }
+}
+
+impl ConnectKernel {
+    fn on_surfaces(gpu: &Gpu, scene: &GpuScene, is_parallel: bool, settings: &BidirectionalSettings) -> Result<Self> {
         let traversal = scene.index_traversal();
         let spec = surface_spec!(bdpt_connect, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
             separable_masking: false,
             has_alpha: scene.profile().has_alpha(),
+            has_media: false,
+            has_path_automaton: settings.has_states(),
             sampler_kind: settings.sampler as u32,
             parallel_camera: is_parallel,
             strategy: settings.strategies.kind(),
@@ -49,16 +88,30 @@ impl Connect {
             index_kind: traversal.kind(),
             ..Default::default()
         });
-        Ok(Self {
-            pipeline: traversal.pipeline(gpu, &spec)?,
-            connections: settings.connections,
-            bounces: settings.bounces(),
-            rays_at_once: rays_of_submission(gpu),
-        })
+        traversal.pipeline(gpu, &spec).map(Self::Surfaces)
     }
 
-    pub fn pipeline(&self) -> PipelineInfo {
-        self.pipeline.info()
+    fn in_media(gpu: &Gpu, scene: &GpuScene, is_parallel: bool, settings: &BidirectionalSettings) -> Result<Self> {
+        let (traversal, media) = (scene.index_traversal(), scene.profile().media);
+        let (stretches, index_quota) = stretches_of(gpu, scene, settings, true)?;
+        let spec = surface_spec!(bdpt_medium_connect, scene, {
+            has_multiple_scattering: scene.bsdf_features().multiple_scattering,
+            separable_masking: false,
+            has_alpha: scene.profile().has_alpha(),
+            has_media: true,
+            has_grids: media.heterogeneous,
+            has_homogeneous: media.homogeneous,
+            has_path_automaton: settings.has_states(),
+            sampler_kind: settings.sampler as u32,
+            parallel_camera: is_parallel,
+            strategy: settings.strategies.kind(),
+            connections: settings.connections,
+            stretches,
+            index_quota,
+            index_kind: traversal.kind(),
+            ..Default::default()
+        });
+        traversal.pipeline(gpu, &spec).map(Self::Media)
     }
 }
 
@@ -86,17 +139,66 @@ impl ConnectStage<'_> {
             subpath_weights: memory.weights.view(),
             connection_states: memory.states.view(),
             bdpt_counters: memory.counts.device.view(),
-            ..set_of(self.vertices, &memory.weights)
+            ..memory.set_with(self.vertices)
+        }
+    }
+
+    fn dispatch(&self, pass: &mut Pass<'_>, wave: &WaveSet<'_>, over: Over<'_>) -> Result<()> {
+        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
+        let mut push = self.push();
+        if let Over::Stopped { first, .. } = over {
+            (push.first_place, push.goes_on) = (first, 1);
+        }
+        match &self.connect.kernel {
+            ConnectKernel::Surfaces(kernel) => {
+                let sets: [&dyn BindingSet<'_>; 4] = [wave, &index, &scene, &own];
+                match over {
+                    Over::All(places) => pass.dispatch_indirect(kernel, &sets, &push, places),
+                    Over::Stopped { count, .. } => {
+                        pass.dispatch(kernel, &sets, &push, [kernel.groups_for(count), 1, 1])
+                    }
+                }
+            }
+            ConnectKernel::Media(kernel) => {
+                let media = BidirectionalMediaSet {
+                    medium_connection_states: self.memory.states.view(),
+                    ..media_set_of(self.scene, &self.memory.weights)
+                };
+                let sets: [&dyn BindingSet<'_>; 5] = [wave, &index, &scene, &own, &media];
+                let push = self.push_in_media(push);
+                match over {
+                    Over::All(places) => pass.dispatch_indirect(kernel, &sets, &push, places),
+                    Over::Stopped { count, .. } => {
+                        pass.dispatch(kernel, &sets, &push, [kernel.groups_for(count), 1, 1])
+                    }
+                }
+            }
+        }
+    }
+
+    /// The same for scenes with media.
+    fn push_in_media(&self, told: bdpt_connect::Push) -> bdpt_medium_connect::Push {
+        bdpt_medium_connect::Push {
+            scene_lower: told.scene_lower,
+            least_bounces: told.least_bounces,
+            scene_upper: told.scene_upper,
+            most_bounces: told.most_bounces,
+            key: told.key,
+            camera_forward: told.camera_forward,
+            camera_measure: told.camera_measure,
+            vertices: told.vertices,
+            scale: told.scale,
+            first_place: told.first_place,
+            goes_on: told.goes_on,
+            surrounding: self.scene.surrounding().unwrap_or(NO_MEDIUM),
         }
     }
 }
 
 impl ArrivalStage for ConnectStage<'_> {
     fn record(&self, recorder: &mut Recorder, wave: &WaveSet<'_>, places: Places<'_>) -> Result<()> {
-        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
         recorder.pass("bidirectional: connect", |pass| {
-            let sets: [&dyn BindingSet<'_>; 4] = [wave, &index, &scene, &own];
-            pass.dispatch_indirect(&self.connect.pipeline, &sets, &self.push(), places.items)?;
+            self.dispatch(pass, wave, Over::All(places.items))?;
             stage_barrier(pass);
             Ok(())
         })
@@ -129,20 +231,17 @@ impl ArrivalStage for ConnectStage<'_> {
             }
             check_sweeps("bdpt_connect", sweep)?;
         }
-        let (index, scene, own) = (self.scene.index_set(), self.scene.scene_set(), self.set());
-        let push = bdpt_connect::Push {
-            first_place: range as u32 * places,
-            goes_on: 1,
-            ..self.push()
-        };
         recorder.pass("bidirectional: connect on", |pass| {
             if range == 0 {
                 let offset = std::mem::offset_of!(Counters, remaining) as u64;
                 pass.fill(counts.device.slice(offset, size_of::<u32>() as u64), 0)?;
                 pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             }
-            let groups = [connect.pipeline.groups_for(places.min(stopped.places)), 1, 1];
-            pass.dispatch(&connect.pipeline, &[wave, &index, &scene, &own], &push, groups)?;
+            let over = Over::Stopped {
+                first: range as u32 * places,
+                count: places.min(stopped.places),
+            };
+            self.dispatch(pass, wave, over)?;
             if range + 1 == ranges {
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
                 self.read_back(pass)?;

@@ -1,20 +1,19 @@
 //! Eye subpaths: waves of consecutive pixels with the samples of a pass, on the path tracer's camera rays and film.
 
 use super::connect::{Connect, ConnectStage};
-use super::kernels::{Counts, set_of, work};
+use super::kernels::{Counts, Viewpoint, media_set_of, path_states, set_of, work};
 use super::light_paths::LightPaths;
 use super::settings::BidirectionalSettings;
 use crate::Result;
 use crate::film::GpuFilm;
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{OUTSIDE, WALK_GROUP};
+use crate::gpu::shaders::constants::{NO_MEDIUM, WALK_GROUP};
 use crate::gpu::shaders::sets::{BidirectionalSet, PathSlotSet, WaveSet};
-use crate::gpu::shaders::techniques::bidirectional::bdpt_shade;
+use crate::gpu::shaders::techniques::bidirectional::{bdpt_eye_medium, bdpt_shade};
 use crate::gpu::shaders::techniques::path::{path_camera, path_resolve};
-use crate::gpu::shaders::types::{CameraView, ConnectionState, PartialWeights, PathAov};
+use crate::gpu::shaders::types::{CameraView, ConnectionState, MediumConnectionState, PartialWeights, PathAov};
 use crate::gpu::{Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView};
-use crate::scene::camera_frame::CameraFrame;
 use crate::transport::{GpuScene, surface_spec};
 use crate::walk::{
     ArrivalStage, Bounce, WalkKey, WalkStages, WaveBuffers, WaveNeeds, default_slots, slots_of_device, stage_barrier,
@@ -97,20 +96,30 @@ impl Cursor {
 pub(super) struct EyeMemory {
     aovs: Buffer,
     pub weights: Buffer,
+    /// Of connections, by place.
     pub states: Buffer,
+    /// Of path sets that are more than a range of bounces.
+    path_states: Option<Buffer>,
     pub counts: Counts,
     /// Stands where no light subpath has left vertices.
     pub no_vertices: TexelView,
 }
 
 impl EyeMemory {
-    fn new(gpu: &Gpu, slots: u32, aovs: bool, connects: bool) -> Result<Self> {
+    fn new(gpu: &Gpu, slots: u32, has_media: bool, settings: &BidirectionalSettings) -> Result<Self> {
         let format = vk::Format::R32G32B32A32_UINT;
-        let states = if connects { slots } else { 1 };
+        let states = if settings.joins() { slots } else { 1 };
+        let aovs = if settings.aovs { slots } else { 1 };
+        let of_connection = if has_media {
+            size_of::<MediumConnectionState>()
+        } else {
+            size_of::<ConnectionState>()
+        };
         Ok(Self {
-            aovs: work(gpu, "path aovs", size_of::<PathAov>(), if aovs { slots } else { 1 })?,
+            aovs: work(gpu, "path aovs", size_of::<PathAov>(), aovs)?,
             weights: work(gpu, "eye subpath weights", size_of::<PartialWeights>(), slots)?,
-            states: work(gpu, "connection states", size_of::<ConnectionState>(), states)?,
+            states: work(gpu, "connection states", of_connection, states)?,
+            path_states: path_states(gpu, settings)?,
             counts: Counts::new(gpu)?,
             no_vertices: gpu.storage_texels("no light vertices", Category::Work, format, 1)?,
         })
@@ -126,9 +135,10 @@ impl EyeMemory {
         paths: u32,
         settings: &BidirectionalSettings,
     ) -> Result<(WaveBuffers, Self)> {
+        let has_media = scene.profile().media.any();
         let needs = WaveNeeds {
             waiting: scene.has_lights(),
-            media: false,
+            media: has_media,
             airlight: false,
         };
         let wanted = match settings.paths_in_flight {
@@ -140,10 +150,7 @@ impl EyeMemory {
             .max(1)
             .next_multiple_of(WALK_GROUP)
             .min(slots_of_device(gpu));
-        let connects = settings.joins();
-        WaveBuffers::within_memory(gpu, slots, needs, |slots| {
-            Self::new(gpu, slots, settings.aovs, connects)
-        })
+        WaveBuffers::within_memory(gpu, slots, needs, |slots| Self::new(gpu, slots, has_media, settings))
     }
 
     /// Set 1 of the path tracer's kernels; what they do not use is another buffer.
@@ -158,28 +165,38 @@ impl EyeMemory {
     }
 
     fn set(&self) -> BidirectionalSet<'_> {
-        set_of(&self.no_vertices, &self.weights)
+        self.set_with(&self.no_vertices)
+    }
+
+    /// The set with those vertices, and of the rest what eye paths have.
+    pub fn set_with<'a>(&'a self, vertices: &'a TexelView) -> BidirectionalSet<'a> {
+        BidirectionalSet {
+            bidirectional_states: self.path_states.as_ref().unwrap_or(&self.weights).view(),
+            ..set_of(vertices, &self.weights)
+        }
     }
 }
 
 /// The kernels of eye paths; all but the last depend on the camera.
 pub(super) struct EyeKernels {
     camera: ComputePipeline<path_camera::Kernel>,
+    /// Only where there are media.
+    medium: Option<ComputePipeline<bdpt_eye_medium::Kernel>>,
     shade: ComputePipeline<bdpt_shade::Kernel>,
     connect: Option<Connect>,
     resolve: ComputePipeline<path_resolve::Kernel>,
-    pub frame: CameraFrame,
+    pub view: Viewpoint,
 }
 
 impl EyeKernels {
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
-        frame: &CameraFrame,
+        view: &Viewpoint,
         settings: &BidirectionalSettings,
         connects: bool,
     ) -> Result<Self> {
-        let profile = scene.profile();
+        let (profile, frame) = (scene.profile(), &view.frame);
         let camera = path_camera::Spec {
             sampler_kind: settings.sampler as u32,
             has_lens: frame.lens_radius > 0.0 && !frame.orthographic,
@@ -194,36 +211,61 @@ impl EyeKernels {
             has_area_lights: scene.has_area_lights(),
             has_punctual_lights: scene.has_punctual_lights(),
             has_alpha: profile.has_alpha(),
-            has_media: false,
+            has_media: profile.media.any(),
             has_light_tree: false,
-            has_path_automaton: false,
+            has_path_automaton: settings.has_states(),
             has_lobe_labels: false,
             sampler_kind: settings.sampler as u32,
             write_aovs: settings.aovs,
             strategy: settings.strategies.kind(),
             parallel_camera: frame.orthographic,
         });
+        let medium = bdpt_eye_medium::Spec {
+            // What surfaces scatter by is not compiled into this stage.
+            has_textures: shade.has_textures,
+            has_vertex_colors: shade.has_vertex_colors,
+            has_shading_normals: false,
+            has_normal_maps: false,
+            has_absorption: shade.has_absorption,
+            has_unlit: shade.has_unlit,
+            has_instances: shade.has_instances,
+            has_environment: shade.has_environment,
+            has_area_lights: shade.has_area_lights,
+            has_punctual_lights: shade.has_punctual_lights,
+            has_alpha: shade.has_alpha,
+            has_path_automaton: shade.has_path_automaton,
+            sampler_kind: shade.sampler_kind,
+            has_grids: profile.media.heterogeneous,
+            has_homogeneous: profile.media.homogeneous,
+            strategy: shade.strategy,
+            parallel_camera: shade.parallel_camera,
+            ..Default::default()
+        };
+        let medium = shade.has_media.then(|| gpu.compute_pipeline(&medium));
         let connect = connects.then(|| Connect::new(gpu, scene, frame.orthographic, settings));
         Ok(Self {
             camera: gpu.compute_pipeline(&camera)?,
+            medium: medium.transpose()?,
             shade: gpu.compute_pipeline(&shade)?,
             connect: connect.transpose()?,
             resolve: gpu.compute_pipeline(&path_resolve::Spec {
                 write_aovs: settings.aovs,
             })?,
-            frame: *frame,
+            view: *view,
         })
     }
 
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let mut all = vec![self.camera.info(), self.shade.info(), self.resolve.info()];
+        all.extend(self.medium.as_ref().map(ComputePipeline::info));
         all.extend(self.connect.as_ref().map(Connect::pipeline));
         all
     }
 
     /// A pixel's area in the picture at distance 1, or in m² of an orthographic camera.
     fn pixel_area(&self, [width, height]: [u32; 2]) -> f32 {
-        4.0 * self.frame.half_width * self.frame.half_height / (width as f32 * height as f32)
+        let frame = &self.view.frame;
+        4.0 * frame.half_width * frame.half_height / (width as f32 * height as f32)
     }
 }
 
@@ -273,7 +315,7 @@ impl<'a> EyeStages<'a> {
                 count,
                 walks,
                 key: wave.key(settings.seed),
-                camera_forward: kernels.frame.forward,
+                camera_forward: kernels.view.frame.forward,
                 camera_measure,
             }),
             _ => None,
@@ -287,7 +329,7 @@ impl<'a> EyeStages<'a> {
     }
 
     fn view(&self) -> CameraView {
-        let v = &self.parts.kernels.frame;
+        let v = &self.parts.kernels.view.frame;
         CameraView {
             origin: v.origin,
             half_width: v.half_width,
@@ -299,7 +341,7 @@ impl<'a> EyeStages<'a> {
             focus_distance: v.focus_distance,
             width: self.parts.size[0],
             height: self.parts.size[1],
-            interior: OUTSIDE,
+            interior: self.parts.kernels.view.interior,
         }
     }
 }
@@ -330,6 +372,7 @@ impl WalkStages for EyeStages<'_> {
         self.connect.as_ref().map(|connect| connect as &dyn ArrivalStage)
     }
 
+    /// What happens on the way through media, and where paths have arrived.
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let EyeParts {
             scene,
@@ -349,7 +392,7 @@ impl WalkStages for EyeStages<'_> {
             key: self.wave.key(settings.seed),
             roulette_start: settings.roulette_start,
             roulette_cap: settings.roulette_cap,
-            camera_forward: kernels.frame.forward,
+            camera_forward: kernels.view.frame.forward,
             camera_measure: self.camera_measure,
             disk_pdf: if radius > 0.0 {
                 1.0 / (PI * radius * radius)
@@ -357,6 +400,29 @@ impl WalkStages for EyeStages<'_> {
                 0.0
             },
         };
+        if let Some(medium) = &kernels.medium {
+            let push = bdpt_eye_medium::Push {
+                scene_lower: push.scene_lower,
+                least_bounces: push.least_bounces,
+                scene_upper: push.scene_upper,
+                most_bounces: push.most_bounces,
+                key: push.key,
+                roulette_start: push.roulette_start,
+                roulette_cap: push.roulette_cap,
+                camera_forward: push.camera_forward,
+                camera_measure: push.camera_measure,
+                disk_pdf: push.disk_pdf,
+                surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
+            };
+            recorder.pass("bidirectional: media", |pass| {
+                let (of_scene, own) = (scene.emission_set(emission), memory.set());
+                let media = media_set_of(scene, &memory.weights);
+                let sets: [&dyn BindingSet<'_>; 4] = [&bounce.wave, &of_scene, &own, &media];
+                pass.dispatch_indirect(medium, &sets, &push, bounce.places.items)?;
+                stage_barrier(pass);
+                Ok(())
+            })?;
+        }
         recorder.pass("bidirectional: shade", |pass| {
             let (scene, slots, own) = (scene.emission_set(emission), memory.path_slots(), memory.set());
             let sets: [&dyn BindingSet<'_>; 4] = [&bounce.wave, &slots, &scene, &own];

@@ -9,19 +9,22 @@
 use std::sync::Arc;
 
 use super::eye::EyeWave;
-use super::kernels::{Counters, Counts, check_sweeps, rays_of_submission, set_of, work};
+use super::kernels::{
+    Counters, Counts, Viewpoint, check_sweeps, media_set_of, path_states, rays_of_submission, set_of, work,
+};
 use super::settings::BidirectionalSettings;
-use super::splats::{CameraSplats, ShownWalks, camera_pipeline, splats, vertices_within};
+use super::splats::{CameraSplats, Shown, ShownWalks, SightKernel, splats, vertices_within};
 use crate::gpu::ash::vk;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{LIGHT_VERTEX_QUARTERS, WALK_GROUP};
+use crate::gpu::shaders::constants::{LIGHT_VERTEX_QUARTERS, NO_MEDIUM, WALK_GROUP};
 use crate::gpu::shaders::sets::{BidirectionalSet, WaveSet};
-use crate::gpu::shaders::techniques::bidirectional::{bdpt_add, bdpt_append, bdpt_emit, bdpt_scatter, bdpt_splat};
+use crate::gpu::shaders::techniques::bidirectional::{
+    bdpt_add, bdpt_append, bdpt_emit, bdpt_scatter, bdpt_splat, bdpt_walk_medium,
+};
 use crate::gpu::shaders::types::PartialWeights;
 use crate::gpu::{
     Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
 };
-use crate::scene::camera_frame::CameraFrame;
 use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
     Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds, slots_of_device,
@@ -33,6 +36,8 @@ use crate::{Error, Result};
 const BOUNCES_PER_SUBMISSION: usize = 8;
 /// Vertices that there is room for at first, a walk.
 const VERTICES_PER_WALK: u32 = 6;
+/// Rays to the camera of a submission in scenes with media, at most: what is kept of each on its way has room.
+const MEDIA_RAYS: u32 = 1 << 18;
 /// Tells the random numbers of light subpaths from those of eye paths.
 const LIGHT_SEED: u32 = 0x6c69_6768;
 
@@ -59,6 +64,8 @@ pub(super) struct LightCounts {
     /// Vertices that the camera might see.
     pub in_view: u64,
     pub shadow_rays: u64,
+    /// With media.
+    pub collisions: u64,
     pub stalls: u64,
     pub postponed: u64,
 }
@@ -79,8 +86,12 @@ pub(super) struct LightPaths {
 struct LightWalks {
     scene: Arc<GpuScene>,
     emit: ComputePipeline<bdpt_emit::Kernel>,
+    /// Only where there are media.
+    medium: Option<ComputePipeline<bdpt_walk_medium::Kernel>>,
     scatter: ComputePipeline<bdpt_scatter::Kernel>,
     append: ComputePipeline<bdpt_append::Kernel>,
+    /// Of path sets that are more than a range of bounces.
+    states: Option<Buffer>,
     /// [`GpuScene::emission_choice`].
     emission: Option<TexelView>,
     weights: Buffer,
@@ -104,27 +115,41 @@ impl LightPaths {
     pub fn new(
         gpu: &Gpu,
         scene: &Arc<GpuScene>,
-        frame: &CameraFrame,
+        view: &Viewpoint,
         size: [u32; 2],
         settings: &BidirectionalSettings,
     ) -> Result<Self> {
+        let (profile, media) = (scene.profile(), scene.profile().media);
         let emit = emission_spec!(bdpt_emit, scene, {
             sampler_kind: settings.sampler as u32,
+            has_path_automaton: settings.has_states(),
             ..Default::default()
         });
         let scatter = surface_spec!(bdpt_scatter, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
             separable_masking: false,
             sampler_kind: settings.sampler as u32,
+            has_media: media.any(),
+            has_path_automaton: settings.has_states(),
             ..Default::default()
         });
+        let medium = bdpt_walk_medium::Spec {
+            has_absorption: profile.has_absorption,
+            has_instances: profile.keeps_instances,
+            has_grids: media.heterogeneous,
+            has_homogeneous: media.homogeneous,
+            sampler_kind: settings.sampler as u32,
+            has_path_automaton: settings.has_states(),
+            ..Default::default()
+        };
+        let medium = media.any().then(|| gpu.compute_pipeline(&medium));
         let [samples, group] = settings.pass_of(size[0] * size[1]);
         let group = group.min(slots_of_device(gpu) / samples);
         let count = samples * group;
         let slots = count.next_multiple_of(WALK_GROUP).min(slots_of_device(gpu));
         let needs = WaveNeeds {
             waiting: true,
-            media: false,
+            media: media.any(),
             airlight: false,
         };
         let options = WalkOptions {
@@ -142,8 +167,10 @@ impl LightPaths {
             walker: Walker::new(gpu, Arc::clone(scene), buffers, options)?,
             walks: LightWalks {
                 emit: gpu.compute_pipeline(&emit)?,
+                medium: medium.transpose()?,
                 scatter: gpu.compute_pipeline(&scatter)?,
                 append: gpu.compute_pipeline(&Default::default())?,
+                states: path_states(gpu, settings)?,
                 emission: scene.emission_choice(gpu)?,
                 weights: work(gpu, "light subpath weights", size_of::<PartialWeights>(), slots)?,
                 counts: Counts::new(gpu)?,
@@ -159,11 +186,16 @@ impl LightPaths {
             camera: None,
             phase: Phase::Before,
             vertices: 0,
-            rays_at_once: rays_of_submission(gpu),
+            rays_at_once: if media.any() {
+                rays_of_submission(gpu).min(MEDIA_RAYS)
+            } else {
+                rays_of_submission(gpu)
+            },
             counts: LightCounts::default(),
         };
         if settings.strategies.splats() {
-            paths.camera = Some(CameraSplats::new(gpu, scene, frame, size, settings, capacity)?);
+            let room = (capacity, paths.rays_at_once);
+            paths.camera = Some(CameraSplats::new(gpu, scene, view, size, settings, room)?);
         }
         Ok(paths)
     }
@@ -200,10 +232,10 @@ impl LightPaths {
     }
 
     /// Looks through another camera.
-    pub fn set_camera(&mut self, frame: &CameraFrame, settings: &BidirectionalSettings) -> Result<()> {
+    pub fn set_camera(&mut self, view: &Viewpoint, settings: &BidirectionalSettings) -> Result<()> {
         if let Some(camera) = &mut self.camera {
-            camera.pipeline = camera_pipeline(&self.gpu, &self.walks.scene, frame, settings)?;
-            camera.frame = *frame;
+            camera.sight = SightKernel::new(&self.gpu, &self.walks.scene, view, settings)?;
+            camera.view = *view;
         }
         Ok(())
     }
@@ -215,9 +247,10 @@ impl LightPaths {
     pub fn pipelines(&self) -> Vec<PipelineInfo> {
         let walks = &self.walks;
         let mut all = vec![walks.emit.info(), walks.scatter.info(), walks.append.info()];
+        all.extend(walks.medium.as_ref().map(ComputePipeline::info));
         all.extend(self.walker.trace_pipelines());
         if let Some(camera) = &self.camera {
-            all.extend([camera.pipeline.info(), camera.splat.info(), camera.add.info()]);
+            all.extend([camera.sight.pipeline(), camera.splat.info(), camera.add.info()]);
         }
         all
     }
@@ -274,6 +307,7 @@ impl LightPaths {
             });
         }
         self.counts.rays += walked.rays;
+        self.counts.collisions += walked.media.collisions;
         self.counts.stalls += walked.stalls;
         self.counts.postponed += walked.postponed;
         if needed > u64::from(self.walks.capacity) {
@@ -310,7 +344,11 @@ impl LightPaths {
             seed: self.walks.seed,
         };
         let (set, scene) = (camera.set(self.walks.set()), &self.walks.scene);
-        let push = camera.push(scene, walks, [shown, end], sweeps > 0);
+        let vertices = Shown {
+            first: shown,
+            end,
+            goes_on: sweeps > 0,
+        };
         let mut recorder = self.gpu.recorder("bidirectional splats")?;
         recorder.pass("light subpaths: to the camera", |p| {
             if shown == 0 && sweeps == 0 {
@@ -322,9 +360,7 @@ impl LightPaths {
             }
             p.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             if end > shown {
-                let (index, scene) = (scene.index_set(), scene.scene_set());
-                let groups = [camera.pipeline.groups_for(end - shown), 1, 1];
-                p.dispatch(&camera.pipeline, &[&index, &scene, &set], &push, groups)?;
+                camera.record(p, scene, &set, walks, vertices)?;
             }
             p.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
             p.copy(self.walks.counts.device.view(), self.walks.counts.readback.view())
@@ -401,6 +437,7 @@ impl LightWalks {
         BidirectionalSet {
             subpath_weights: self.weights.view(),
             bdpt_counters: self.counts.device.view(),
+            bidirectional_states: self.states.as_ref().unwrap_or(&self.weights).view(),
             ..set_of(&self.vertices, &self.weights)
         }
     }
@@ -426,8 +463,25 @@ impl WalkStages for LightStages<'_> {
         })
     }
 
+    /// What happens on the way through media, and where walks have arrived.
     fn record_scatter(&self, recorder: &mut Recorder, bounce: &Bounce<'_>) -> Result<()> {
         let walks = self.walks;
+        if let Some(medium) = &walks.medium {
+            let push = bdpt_walk_medium::Push {
+                key: self.key,
+                surrounding: walks.scene.surrounding().unwrap_or(NO_MEDIUM),
+                last_bounce: walks.last_bounce,
+                group: walks.group,
+            };
+            recorder.pass("light subpaths: media", |pass| {
+                let (scene, own) = (walks.scene.scene_set(), walks.set());
+                let media = media_set_of(&walks.scene, &walks.weights);
+                let sets: [&dyn BindingSet<'_>; 4] = [&bounce.wave, &scene, &own, &media];
+                pass.dispatch_indirect(medium, &sets, &push, bounce.places.items)?;
+                stage_barrier(pass);
+                Ok(())
+            })?;
+        }
         let [lower, upper] = walks.scene.bounds();
         let push = bdpt_scatter::Push {
             scene_lower: lower.to_array(),

@@ -6,6 +6,11 @@
 //! taken to be as likely both ways, here a ratio stands for what they are. Twin of `techniques/bidirectional/bdpt_mis.glsl`.
 //!
 //! Densities are per solid angle; cosines are those to the geometric normal, and positive.
+//!
+//! A vertex in a medium has no cosine (1 stands for it) and the density of its phase function, the same both ways. The probabilities of free flights stand in no weight: every way to
+//! make a path samples the distances of its collisions, by the same densities but for that of the edge that is joined, and a weight may be any function of a path's vertices that sums to one
+//! over the ways to make it. So weights stay what they are whatever the media, in all bands and with null collisions, and where boundaries without an interface are passed; what is lost
+//! is that ways to make a path over a long way through a dense medium are not known to be rarer.
 
 use crate::catalogue::{Bias, Role, Row, sources};
 
@@ -68,6 +73,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
     bias: Some(Bias::Unbiased),
     tests: &[
         "engine/src/techniques/bidirectional/mis.rs::weights_are_those_of_the_balance_heuristic_and_sum_to_one",
+        "engine/src/techniques/bidirectional/mis.rs::weights_of_paths_through_media_sum_to_one",
         "engine/src/techniques/bidirectional/mis.rs::behind_mirrors_only_joints_before_them_count",
         "tests/tests/twins/lights.rs::partial_weights_agree_with_their_twins",
         "tests/tests/bidirectional/strategies.rs::each_way_to_make_a_path_finds_the_same_light",
@@ -142,6 +148,42 @@ mod tests {
                 direct,
                 emitted,
             }
+        }
+
+        /// With some of its inner vertices in media.
+        fn through_media(mut self, random: &mut Random) -> Self {
+            for vertex in 1..self.edges() {
+                if random.below(2) == 0 {
+                    (self.cosines[vertex - 1][1], self.cosines[vertex][0]) = (1.0, 1.0);
+                    self.back[vertex] = self.on[vertex];
+                    self.delta[vertex] = false;
+                }
+            }
+            self
+        }
+
+        /// Fails unless its weights are those of the balance heuristic and sum to one; the ways to make it.
+        fn check(&self) -> usize {
+            let n = self.edges() + 1;
+            // With two vertices light is sampled from the camera, which is no way here: what it sees is what it meets.
+            let first = if n == 2 { 2 } else { 1 };
+            let densities: Vec<Option<f64>> = (first..=n).map(|eye| self.density(eye)).collect();
+            let total: f64 = densities.iter().flatten().sum();
+            let (mut sum, mut ways) = (0.0, 0);
+            for (i, density) in densities.iter().enumerate() {
+                if let Some(density) = density {
+                    let (found, expected) = (self.weight(first + i), density / total);
+                    assert!(
+                        (found / expected - 1.0).abs() < 1e-9,
+                        "{self:?}, {}: {found}, {expected}",
+                        first + i
+                    );
+                    sum += found;
+                    ways += 1;
+                }
+            }
+            assert!(total == 0.0 || (sum - 1.0).abs() < 1e-9, "{self:?}: {sum}");
+            ways
         }
 
         fn edges(&self) -> usize {
@@ -297,28 +339,45 @@ mod tests {
         let mut random = Random(17);
         let mut ways = 0;
         for _ in 0..20_000 {
-            let path = Path::random(&mut random);
-            let n = path.edges() + 1;
-            // With two vertices light is sampled from the camera, which is no way here: what it sees is what it meets.
-            let first = if n == 2 { 2 } else { 1 };
-            let densities: Vec<Option<f64>> = (first..=n).map(|eye| path.density(eye)).collect();
-            let total: f64 = densities.iter().flatten().sum();
-            let mut sum = 0.0;
-            for (i, density) in densities.iter().enumerate() {
-                if let Some(density) = density {
-                    let (found, expected) = (path.weight(first + i), density / total);
-                    assert!(
-                        (found / expected - 1.0).abs() < 1e-9,
-                        "{path:?}, {}: {found}, {expected}",
-                        first + i
-                    );
-                    sum += found;
-                    ways += 1;
-                }
-            }
-            assert!(total == 0.0 || (sum - 1.0).abs() < 1e-9, "{path:?}: {sum}");
+            ways += Path::random(&mut random).check();
         }
         assert!(ways > 40_000, "{ways}");
+    }
+
+    /// With vertices in media, which have no cosines and the same density both ways, beside such on surfaces and mirrors. Distances of flights are in no weight and change none: the estimate
+    /// of a path by each way has the path's whole flight, and the weights that multiply it sum to one.
+    #[test]
+    fn weights_of_paths_through_media_sum_to_one() {
+        let mut random = Random(19);
+        let mut ways = 0;
+        for _ in 0..20_000 {
+            let path = Path::random(&mut random);
+            ways += path.through_media(&mut random).check();
+        }
+        assert!(ways > 40_000, "{ways}");
+    }
+
+    /// The kernel's recursion at a collision, by hand: light subpath of a point light of one collision at distance 2, scattered by a density of 1/8 and joined at distance 3.
+    #[test]
+    fn collisions_have_squared_distances_and_no_cosines() {
+        let emitted = PartialWeights { d_vcm: 4.0, d_vc: 0.0 };
+        let arrived = emitted.mis_arrive(4.0, 1.0);
+        assert_eq!(arrived, PartialWeights { d_vcm: 16.0, d_vc: 0.0 });
+        let scattered = arrived.mis_scatter(1.0, 0.125, 0.125);
+        assert_eq!(
+            scattered,
+            PartialWeights {
+                d_vcm: 8.0,
+                d_vc: 128.0
+            }
+        );
+        assert_eq!(
+            scattered.mis_arrive(9.0, 1.0),
+            PartialWeights {
+                d_vcm: 72.0,
+                d_vc: 128.0
+            }
+        );
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! Sources: E. Lafortune, Y. Willems, "Bi-directional Path Tracing", 1993; E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", PhD thesis, 1997, chapters 9
 //! and 10; I. Georgiev, "Implementing Vertex Connection and Merging", 2012, for the partial weights; T. Davidovič, J. Křivánek, M. Hašan, P. Slusallek, "Progressive Light
 //! Transport Simulation on the GPU", 2014, for the cache of light vertices: an eye vertex is joined to vertices drawn evenly from all that the light subpaths of the pass have left, with
-//! their number as weight, which has the expectation of joining it to all vertices of one light subpath.
+//! their number as weight, which has the expectation of joining it to all vertices of one light subpath. E. Lafortune, Y. Willems, "Rendering Participating Media with Bidirectional Path
+//! Tracing", 1996, for vertices at collisions with media, which are joined like those on surfaces, through what media let through.
 //!
 //! Guarantees: unbiased, since the weights of all ways to make a path sum to one, and each way that a scene leaves out has the weight zero in all others; deterministic in
 //! (seed, pass, walk) and (seed, pixel, sample), on any number of threads, since what light subpaths show the camera is summed in integers. What light subpaths show the
@@ -13,12 +14,12 @@ use std::sync::Arc;
 
 use super::card::refusals;
 use super::eye::{Cursor, EyeKernels, EyeMemory, EyeParts, EyeStages, EyeWave, record_resolve};
+use super::kernels::Viewpoint;
 use super::light_paths::LightPaths;
 use super::settings::BidirectionalSettings;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo, TexelView, Timings, wide_counter};
-use crate::scene::camera_frame::CameraFrame;
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
 use crate::techniques::path::SAMPLES_PER_WAVE;
@@ -48,6 +49,8 @@ pub struct BidirectionalCounts {
     pub vertices_in_view: u64,
     /// Pairs of an eye vertex and a light vertex.
     pub connections: u64,
+    /// Collisions of eye paths and light subpaths with media.
+    pub collisions: u64,
     /// Submissions that ended with rays stopped by the quota, which then went on.
     pub stalls: u64,
     /// Submissions that ended with paths left for later.
@@ -86,7 +89,7 @@ impl BidirectionalPaths {
     /// Prepares a rendering of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a setting or size out of range, [`Error::Unsupported`] for a scene with participating media, [`Error::LimitExceeded`] for a ray
+    /// [`Error::Setting`] for a setting or size out of range, [`Error::Unsupported`] for light from infinity in endless media, [`Error::LimitExceeded`] for a ray
     /// index whose leaves are too long for a software device, [`Error::OutOfMemory`].
     pub fn new(
         gpu: &Gpu,
@@ -104,10 +107,10 @@ impl BidirectionalPaths {
             });
         }
         let film = GpuFilm::new(gpu, size, settings.aovs)?;
-        let settings = settings.within(gpu.caps(), size)?;
-        let frame = CameraFrame::new(camera, size)?;
+        let settings = settings.resolved()?.within(gpu.caps(), size)?;
+        let view = Viewpoint::new(&scene, camera, size)?;
         let has_light_paths = scene.has_lights() && scene.light_power() > 0.0 && settings.has_light_paths();
-        let lights = has_light_paths.then(|| LightPaths::new(gpu, &scene, &frame, size, &settings));
+        let lights = has_light_paths.then(|| LightPaths::new(gpu, &scene, &view, size, &settings));
         let lights = lights.transpose()?;
         let connects = lights.is_some() && settings.joins();
         let pixels = size[0] * size[1];
@@ -115,7 +118,7 @@ impl BidirectionalPaths {
             Some(_) => settings.pass_of(pixels)[0],
             None => SAMPLES_PER_WAVE,
         };
-        let kernels = EyeKernels::new(gpu, &scene, &frame, &settings, connects)?;
+        let kernels = EyeKernels::new(gpu, &scene, &view, &settings, connects)?;
         // Takes as much memory as is left, if it must.
         let (buffers, memory) = EyeMemory::within(gpu, &scene, pixels.saturating_mul(samples_per_pass), &settings)?;
         let options = WalkOptions {
@@ -127,7 +130,7 @@ impl BidirectionalPaths {
         };
         Ok(Self {
             gpu: gpu.clone(),
-            path_set: settings.path_set()?,
+            path_set: settings.path_set,
             walker: Walker::new(gpu, Arc::clone(&scene), buffers, options)?,
             emission: scene.emission_choice(gpu)?,
             scene,
@@ -178,6 +181,7 @@ impl BidirectionalPaths {
             counts.light_vertices = c.vertices;
             counts.vertices_in_view = c.in_view;
             counts.shadow_rays += c.shadow_rays;
+            counts.collisions += c.collisions;
             counts.stalls += c.stalls;
             counts.postponed += c.postponed;
         }
@@ -198,12 +202,12 @@ impl BidirectionalPaths {
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used, with which nothing changes; [`Error::DeviceLost`].
     pub fn set_camera(&mut self, camera: &Camera) -> Result<()> {
-        let frame = CameraFrame::new(camera, self.film.size())?;
+        let view = Viewpoint::new(&self.scene, camera, self.film.size())?;
         let connects = self.lights.is_some() && self.settings.joins();
-        let kernels = EyeKernels::new(&self.gpu, &self.scene, &frame, &self.settings, connects)?;
+        let kernels = EyeKernels::new(&self.gpu, &self.scene, &view, &self.settings, connects)?;
         self.film.clear()?;
         if let Some(lights) = &mut self.lights {
-            lights.set_camera(&frame, &self.settings)?;
+            lights.set_camera(&view, &self.settings)?;
         }
         self.kernels = kernels;
         self.begin();
@@ -346,6 +350,7 @@ impl BidirectionalCounts {
     fn note(&mut self, before: &Walked, after: &Walked) {
         self.extend_rays += after.rays - before.rays;
         self.shadow_rays += after.waited - before.waited;
+        self.collisions += after.media.collisions - before.media.collisions;
         self.stalls += after.stalls - before.stalls;
         self.postponed += after.postponed - before.postponed;
     }

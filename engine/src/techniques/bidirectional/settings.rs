@@ -3,7 +3,8 @@
 use super::splats::{sums_within, vertices_within};
 use crate::gpu::Caps;
 use crate::gpu::shaders::constants::{
-    STRATEGY_COMBINED, STRATEGY_CONNECTIONS, STRATEGY_EMISSION, STRATEGY_LIGHT_SAMPLES, STRATEGY_SPLATS,
+    LIGHT_STATES_GROUP_SHIFT, LIGHT_STATES_SHIFT, PATH_SET_STATES, STRATEGY_COMBINED, STRATEGY_CONNECTIONS,
+    STRATEGY_EMISSION, STRATEGY_LIGHT_SAMPLES, STRATEGY_SPLATS,
 };
 use crate::settings::AboveTo;
 use crate::transport::PathSet;
@@ -25,6 +26,12 @@ const VERTICES_EXPECTED: u64 = 28;
 const BOUNCES_MAX: u32 = 4000;
 /// Scatterings that light subpaths are followed through at most, so that none is followed for ever between lossless surfaces.
 const WALK_BOUNCES_MAX: u32 = 4096;
+/// Histories of vertices hold both (`bdpt_vertex.glsl`).
+const _: () = assert!(
+    WALK_BOUNCES_MAX < 1 << LIGHT_STATES_GROUP_SHIFT
+        && SAMPLES_AT_ONCE_MAX <= 1 << (LIGHT_STATES_SHIFT - LIGHT_STATES_GROUP_SHIFT)
+        && PATH_SET_STATES + LIGHT_STATES_SHIFT <= u32::BITS
+);
 
 /// Ways in which a path is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -69,6 +76,8 @@ impl Strategies {
 crate::settings! {
     /// Settings of bidirectional path tracing.
     pub struct BidirectionalSettings {
+        /// Which light paths the picture contains.
+        pub path_set: PathSet = PathSet::ALL, in "all | emitted | direct | indirect | bounces=A..B, with lobes=diffuse+glossy+…; or path expressions: LDE, LS+DE, LS+VE, !L.*S.*E …";
         /// Light subpaths for each sample of all pixels; 0 for as many as there are pixels, as far as a pass has room. Changes the noise only.
         pub light_paths: u32 = 0, in 0..=LIGHT_PATHS_MAX, unit "paths per sample";
         /// Samples of each pixel in a pass, whose eye paths are joined to the light subpaths of all of them: small pictures fill the device so. 0 for as many as make 65536
@@ -92,7 +101,7 @@ crate::settings! {
         pub seed: u32 = 0;
         /// Also gathers albedo, normal and depth of what is seen first. A [`View`](crate::techniques::View) says whether.
         pub aovs: bool = false;
-        /// Scatterings of the light that is shown, at least.
+        /// Scatterings of the light that is shown, at least, beside those of the path set.
         pub least_bounces: u32 = 0, in 0..=BOUNCES_MAX;
         /// And at most; `None` for any number.
         pub most_bounces: Option<u32> = None;
@@ -222,16 +231,44 @@ impl BidirectionalSettings {
         [samples, paths]
     }
 
+    /// With the light paths of the picture in `path_set`, and their range in the numbers of bounces.
+    ///
+    /// # Errors
+    /// As [`BidirectionalSettings::path_set`].
+    pub(super) fn resolved(self) -> Result<Self> {
+        let path_set = self.path_set()?;
+        Ok(Self {
+            path_set,
+            least_bounces: path_set.min_bounces(),
+            most_bounces: path_set.max_bounces(),
+            ..self
+        })
+    }
+
+    /// Whether the path set, once [`resolved`](BidirectionalSettings::resolved), is more than a range of bounces, so that subpaths carry states.
+    pub(super) fn has_states(&self) -> bool {
+        let set = &self.path_set;
+        let range = PathSet::new(set.min_bounces(), set.max_bounces(), PATH_SET_LOBES);
+        range.is_ok_and(|range| range != *set)
+    }
+
     /// The light paths of the picture.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a range that is empty.
+    /// [`Error::Setting`] for a range that is empty, and for an expression that needs too large an automaton beside it.
     pub(super) fn path_set(&self) -> Result<PathSet> {
         if self.most_bounces.is_some_and(|most| most < self.least_bounces) {
             let cause = format!("is less than the least number of bounces, {}", self.least_bounces);
             return Err(Error::setting("most_bounces", self.bounces()[1], cause));
         }
-        PathSet::new(self.least_bounces, self.most_bounces, PATH_SET_LOBES)
+        let range = PathSet::new(self.least_bounces, self.most_bounces, PATH_SET_LOBES)?;
+        if range == PathSet::ALL {
+            return Ok(self.path_set);
+        }
+        if self.path_set == PathSet::ALL {
+            return Ok(range);
+        }
+        self.path_set.intersection(&range)
     }
 }
 
@@ -266,6 +303,34 @@ mod tests {
             ..of(0, None)
         };
         assert!(!alone.has_light_paths());
+    }
+
+    #[test]
+    fn path_sets_and_ranges_of_bounces_are_one_set() {
+        let of = |set: &str, least_bounces, most_bounces| {
+            let settings = BidirectionalSettings {
+                path_set: set.parse().unwrap(),
+                least_bounces,
+                most_bounces,
+                ..BidirectionalSettings::default()
+            };
+            settings.resolved().unwrap()
+        };
+        for (set, [least, most], expected, has_states) in [
+            ("all", [0, 9], "bounces=0..9", false),
+            ("bounces=2..5", [3, 9], "bounces=3..5", false),
+            ("LS+VE", [0, 9], "LS{1,8}VE", true),
+            ("LDE|LVE", [1, 9], "LDE|LVE", true),
+            ("bounces=0..,lobes=diffuse", [0, 9], "bounces=0..9,lobes=diffuse", true),
+        ] {
+            let resolved = of(set, least, Some(most));
+            assert_eq!(resolved.path_set, expected.parse().unwrap(), "{set}");
+            assert_eq!(resolved.has_states(), has_states, "{set}");
+            // Once more changes nothing.
+            assert_eq!(resolved.path_set().unwrap(), resolved.path_set, "{set}");
+        }
+        assert!(!of("emitted", 0, None).has_light_paths());
+        assert!(of("LS+VE", 0, None).joins());
     }
 
     #[test]

@@ -1,14 +1,15 @@
 //! What light subpaths show the camera: a shadow ray for each of their vertices, and sums of what they bring by pixel, in integers.
 
-use super::kernels::{quota_of, work};
+use super::kernels::{Viewpoint, media_set_of, quota_of, stretches_of, work};
 use super::settings::BidirectionalSettings;
 use crate::Result;
-use crate::gpu::shaders::constants::LIGHT_VERTEX_QUARTERS;
-use crate::gpu::shaders::sets::BidirectionalSet;
-use crate::gpu::shaders::techniques::bidirectional::{bdpt_add, bdpt_camera, bdpt_splat};
-use crate::gpu::shaders::types::{LightSplat, SplatSum};
-use crate::gpu::{Buffer, Caps, ComputePipeline, Gpu};
-use crate::scene::camera_frame::CameraFrame;
+use crate::gpu::shaders::constants::{
+    BOUNCES_MOST_SHIFT, BOUNCES_UNBOUNDED, LIGHT_VERTEX_QUARTERS, NO_MEDIUM, SPLATS_GO_ON,
+};
+use crate::gpu::shaders::sets::{BidirectionalMediaSet, BidirectionalSet};
+use crate::gpu::shaders::techniques::bidirectional::{bdpt_add, bdpt_camera, bdpt_medium_camera, bdpt_splat};
+use crate::gpu::shaders::types::{LightSplat, MediumRay, SplatSum};
+use crate::gpu::{Buffer, Caps, ComputePipeline, Gpu, Pass, PipelineInfo};
 use crate::transport::{GpuScene, surface_spec};
 
 /// Sums are the same bits for up to as many splats.
@@ -23,30 +24,50 @@ pub(super) struct ShownWalks {
     pub seed: u32,
 }
 
+/// The kernel that shows vertices to a camera.
+pub(super) enum SightKernel {
+    Surfaces(ComputePipeline<bdpt_camera::Kernel>),
+    /// In scenes with media.
+    Media(ComputePipeline<bdpt_medium_camera::Kernel>),
+}
+
 /// Kernels and memory of what the camera is shown.
 pub(super) struct CameraSplats {
-    pub pipeline: ComputePipeline<bdpt_camera::Kernel>,
+    pub sight: SightKernel,
     pub splat: ComputePipeline<bdpt_splat::Kernel>,
     pub add: ComputePipeline<bdpt_add::Kernel>,
     pub splats: Buffer,
     pub sums: Buffer,
-    pub frame: CameraFrame,
+    pub view: Viewpoint,
     pub size: [u32; 2],
     bounces: [u32; 2],
+    /// Of the vertices of a dispatch, in scenes with media.
+    rays: Option<Buffer>,
+}
+
+/// Vertices that are shown together.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shown {
+    pub first: u32,
+    pub end: u32,
+    /// Those of them that have stopped.
+    pub goes_on: bool,
 }
 
 impl CameraSplats {
     pub fn new(
         gpu: &Gpu,
         scene: &GpuScene,
-        frame: &CameraFrame,
+        view: &Viewpoint,
         size: [u32; 2],
         settings: &BidirectionalSettings,
-        capacity: u32,
+        (capacity, at_once): (u32, u32),
     ) -> Result<Self> {
         let pixels = size[0] * size[1];
+        let rays = || work(gpu, "splat rays", size_of::<MediumRay>(), at_once);
+        let rays = scene.profile().media.any().then(rays);
         Ok(Self {
-            pipeline: camera_pipeline(gpu, scene, frame, settings)?,
+            sight: SightKernel::new(gpu, scene, view, settings)?,
             splat: gpu.compute_pipeline(&Default::default())?,
             add: gpu.compute_pipeline(&Default::default())?,
             splats: splats(gpu, capacity)?,
@@ -56,9 +77,10 @@ impl CameraSplats {
                 size_of::<SplatSum>(),
                 pixels * settings.pass_of(pixels)[0],
             )?,
-            frame: *frame,
+            view: *view,
             size,
             bounces: settings.bounces(),
+            rays: rays.transpose()?,
         })
     }
 
@@ -71,15 +93,70 @@ impl CameraSplats {
         }
     }
 
-    /// For the vertices from `first` up to `end`, or those of them that have stopped.
-    pub fn push(
+    /// Records what some vertices show the camera.
+    ///
+    /// # Errors
+    /// Those of recording.
+    pub fn record(
         &self,
+        pass: &mut Pass<'_>,
         scene: &GpuScene,
+        set: &BidirectionalSet<'_>,
         walks: ShownWalks,
-        [first, end]: [u32; 2],
-        goes_on: bool,
-    ) -> bdpt_camera::Push {
-        let (v, [lower, upper]) = (&self.frame, scene.bounds());
+        shown: Shown,
+    ) -> Result<()> {
+        let (index, of_scene) = (scene.index_set(), scene.scene_set());
+        let (push, vertices) = (self.push(scene, walks, shown), shown.end - shown.first);
+        match &self.sight {
+            SightKernel::Surfaces(kernel) => {
+                let groups = [kernel.groups_for(vertices), 1, 1];
+                pass.dispatch(kernel, &[&index, &of_scene, set], &push, groups)
+            }
+            SightKernel::Media(kernel) => {
+                let rays = self.rays.as_ref().unwrap_or(&self.splats);
+                let media = BidirectionalMediaSet {
+                    medium_splat_rays: rays.view(),
+                    ..media_set_of(scene, &self.sums)
+                };
+                let push = self.push_in_media(scene, push);
+                let groups = [kernel.groups_for(vertices), 1, 1];
+                pass.dispatch(kernel, &[&index, &of_scene, set, &media], &push, groups)
+            }
+        }
+    }
+
+    /// The same for scenes with media.
+    fn push_in_media(&self, scene: &GpuScene, told: bdpt_camera::Push) -> bdpt_medium_camera::Push {
+        let most = match self.bounces[1] {
+            u32::MAX => BOUNCES_UNBOUNDED,
+            most => most,
+        };
+        bdpt_medium_camera::Push {
+            origin: told.origin,
+            half_width: told.half_width,
+            right: told.right,
+            half_height: told.half_height,
+            up: told.up,
+            lens_radius: told.lens_radius,
+            forward: told.forward,
+            focus_distance: told.focus_distance,
+            width: told.width,
+            height: told.height,
+            scene_lower: told.scene_lower,
+            bounces: self.bounces[0] | most << BOUNCES_MOST_SHIFT,
+            scene_upper: told.scene_upper,
+            interior: self.view.interior,
+            pass: told.pass,
+            walks: told.walks,
+            seed: told.seed,
+            first: told.first | if told.goes_on != 0 { SPLATS_GO_ON } else { 0 },
+            end: told.end,
+            surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
+        }
+    }
+
+    fn push(&self, scene: &GpuScene, walks: ShownWalks, shown: Shown) -> bdpt_camera::Push {
+        let (v, [lower, upper]) = (&self.view.frame, scene.bounds());
         bdpt_camera::Push {
             origin: v.origin,
             half_width: v.half_width,
@@ -98,33 +175,62 @@ impl CameraSplats {
             pass: walks.pass,
             walks: walks.group,
             seed: walks.seed,
-            first,
-            end,
-            goes_on: goes_on.into(),
+            first: shown.first,
+            end: shown.end,
+            goes_on: shown.goes_on.into(),
         }
     }
 }
 
-/// The kernel that shows vertices to a camera.
-pub(super) fn camera_pipeline(
-    gpu: &Gpu,
-    scene: &GpuScene,
-    frame: &CameraFrame,
-    settings: &BidirectionalSettings,
-) -> Result<ComputePipeline<bdpt_camera::Kernel>> {
-    let traversal = scene.index_traversal();
-    let spec = surface_spec!(bdpt_camera, scene, {
-        has_multiple_scattering: scene.bsdf_features().multiple_scattering,
-        separable_masking: false,
-        has_alpha: scene.profile().has_alpha(),
-        has_lens: frame.lens_radius > 0.0 && !frame.orthographic,
-        parallel_camera: frame.orthographic,
-        strategy: settings.strategies.kind(),
-        index_quota: quota_of(gpu, scene, settings, 1)?,
-        index_kind: traversal.kind(),
-        ..Default::default()
-    });
-    traversal.pipeline(gpu, &spec)
+impl SightKernel {
+    /// # Errors
+    /// As [`quota_of`], and those of pipelines.
+    pub fn new(gpu: &Gpu, scene: &GpuScene, view: &Viewpoint, settings: &BidirectionalSettings) -> Result<Self> {
+        let (traversal, frame) = (scene.index_traversal(), &view.frame);
+        let has_lens = frame.lens_radius > 0.0 && !frame.orthographic;
+        let media = scene.profile().media;
+        if media.any() {
+            let (stretches, index_quota) = stretches_of(gpu, scene, settings, false)?;
+            let spec = surface_spec!(bdpt_medium_camera, scene, {
+                has_multiple_scattering: scene.bsdf_features().multiple_scattering,
+                separable_masking: false,
+                has_alpha: scene.profile().has_alpha(),
+                has_media: true,
+                has_grids: media.heterogeneous,
+                has_homogeneous: media.homogeneous,
+                has_path_automaton: settings.has_states(),
+                has_lens,
+                parallel_camera: frame.orthographic,
+                strategy: settings.strategies.kind(),
+                stretches,
+                index_quota,
+                index_kind: traversal.kind(),
+                ..Default::default()
+            });
+            return traversal.pipeline(gpu, &spec).map(Self::Media);
+        }
+        let spec = surface_spec!(bdpt_camera, scene, {
+            has_multiple_scattering: scene.bsdf_features().multiple_scattering,
+            separable_masking: false,
+            has_alpha: scene.profile().has_alpha(),
+            has_media: false,
+            has_path_automaton: settings.has_states(),
+            has_lens,
+            parallel_camera: frame.orthographic,
+            strategy: settings.strategies.kind(),
+            index_quota: quota_of(gpu, scene, settings, 1)?,
+            index_kind: traversal.kind(),
+            ..Default::default()
+        });
+        traversal.pipeline(gpu, &spec).map(Self::Surfaces)
+    }
+
+    pub fn pipeline(&self) -> PipelineInfo {
+        match self {
+            Self::Surfaces(kernel) => kernel.info(),
+            Self::Media(kernel) => kernel.info(),
+        }
+    }
 }
 
 /// Room for what so many vertices show.

@@ -13,7 +13,7 @@ use crate::gpu::{BufferView, ComputePipeline, DeviceKind, Gpu, Pass, PipelineInf
 use crate::techniques::PathTracerSettings;
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, PathSet, surface_spec};
-use crate::walk::WalkKey;
+use crate::walk::{WalkKey, grid_walk_iterations};
 
 /// Both kernels count alike.
 const _: () =
@@ -28,15 +28,9 @@ pub(super) struct MediumGather {
 const LANES_MAX: u32 = 16;
 /// A connection has room beside the walk of its place.
 const _: () = assert!(
-    walk_iterations(LANES_MAX, GRID_WALK_QUOTA) + 2 * walk_iterations(LANES_MAX, CONNECTION_GRID_QUOTA)
+    grid_walk_iterations(LANES_MAX, GRID_WALK_QUOTA) + 2 * grid_walk_iterations(LANES_MAX, CONNECTION_GRID_QUOTA)
         < SOFTWARE_LOOP_CAP
 );
-
-/// Loop iterations that a quota lets a walk through a grid take, in a subgroup whose lanes take turns at worst in the loop over blocks, where each unit of the quota is one. The loop around it, over
-/// tentative collisions, is the same for all lanes. The pass that ends a loop counts too.
-const fn walk_iterations(lanes: u32, quota: u32) -> u32 {
-    (lanes + 1) * (quota + 1)
-}
 
 /// The places of a dispatch.
 pub(super) enum Over<'a> {
@@ -71,7 +65,7 @@ impl MediumGather {
         };
         // The walk of the eye path's ray, and one of each shadow ray's stretches.
         let [of_place, of_light] = if profile.media.heterogeneous {
-            [GRID_WALK_QUOTA, CONNECTION_GRID_QUOTA].map(|quota| walk_iterations(lanes, quota))
+            [GRID_WALK_QUOTA, CONNECTION_GRID_QUOTA].map(|quota| grid_walk_iterations(lanes, quota))
         } else {
             [0, 0]
         };
@@ -166,6 +160,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "shaders/techniques/instant_radiosity/collision_light.glsl",
         "shaders/techniques/path/path_medium.comp",
         "shaders/transport/media_tracking.glsl",
+        "shaders/walk/medium_ray.glsl",
     ],
     bias: Some(Bias::Unbiased),
     tests: &[

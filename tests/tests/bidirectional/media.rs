@@ -1,0 +1,344 @@
+//! Scenes with media: collisions are vertices of both subpaths.
+
+use super::*;
+use clerestory::Error;
+use clerestory::render::{RenderOptions, Renderer};
+use clerestory::scene::{DensityGrid, Environment, Medium, Phase};
+use clerestory::techniques::bidirectional::BidirectionalCounts;
+use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
+use clerestory_tests::child::{hash_in_child, print_hash};
+use clerestory_tests::gpu;
+
+/// Set in the processes that only print their picture's hash.
+const CHILD: &str = "CLERESTORY_TEST_PRINT_BIDIRECTIONAL_HASH_OF_FOG";
+const CHILD_TEST: &str = "media::prints_its_hash_when_asked";
+const SAMPLES: u32 = 128;
+const REFERENCE: u32 = 1024;
+const FORWARD: Phase = Phase::HenyeyGreenstein { g: 0.6 };
+
+/// A medium whose bands come differently far.
+fn fog(phase: Phase) -> Medium {
+    Medium {
+        sigma_s: Vec3::new(0.4, 0.6, 0.9),
+        sigma_a: Vec3::new(0.2, 0.1, 0.05),
+        phase,
+        ..Medium::default()
+    }
+}
+
+/// The room with a lamp, filled with it.
+pub(super) fn fog_room(phase: Phase) -> Scene {
+    let mut scene = room();
+    add_lamp(&mut scene, 3.0);
+    scene.name = format!("fog with {phase:?}");
+    scene.media.push(fog(phase));
+    scene.surrounding = Some(0);
+    scene
+}
+
+/// The room with a lamp and a point light, and a body of a denser medium behind an invisible boundary.
+fn fog_body(phase: Phase) -> Scene {
+    let mut scene = room();
+    add_lamp(&mut scene, 3.0);
+    add_point(&mut scene, Vec3::new(0.6, 0.6, 0.5), 0.5);
+    scene.name = format!("body of fog with {phase:?}");
+    scene.media.push(Medium {
+        sigma_s: Vec3::new(2.0, 3.0, 4.0),
+        ..fog(phase)
+    });
+    let boundary = scene.add_material(Material {
+        name: "boundary".into(),
+        boundary: true,
+        interior: Some(0),
+        ..Material::default()
+    });
+    scene.place(cuboid(
+        "fog",
+        boundary,
+        Vec3::new(-0.2, -0.8, -0.7),
+        Vec3::new(0.6, 0.1, 0.3),
+    ));
+    scene
+}
+
+/// The body, with a density that changes across it, beside fog everywhere else if so wanted.
+fn cloud(around: bool) -> Scene {
+    let mut scene = fog_body(FORWARD);
+    scene.name = format!("cloud, in fog: {around}");
+    let density = |p: DVec3| (2.0 * p.x * (0.5 + 0.5 * (7.0 * p.y).sin()) + 0.3 * p.z) as f32;
+    let grid = DensityGrid::from_fn([8, 12, 6], density);
+    scene.media[0].density = Some(grid.in_box(DVec3::new(-0.2, -0.8, -0.7), DVec3::new(0.6, 0.1, 0.3)));
+    if around {
+        scene.media.push(fog(Phase::Isotropic));
+        scene.surrounding = Some(1);
+    }
+    scene
+}
+
+/// All but lamps that the camera sees itself, whose outlines are rare and bright in pixels that they barely touch.
+fn expect_agreement(gpu: &Gpu, scene: &Scene, samples: u32, reference: u32) {
+    let settings = BidirectionalSettings {
+        least_bounces: 1,
+        ..settings()
+    };
+    let found = passes(gpu, scene, &settings, samples);
+    found.expect_same_as(&scene.name, &traced(gpu, scene, "bounces=1..", reference));
+}
+
+fn bits(picture: &[Vec<f32>; 2]) -> Vec<u32> {
+    picture.iter().flatten().map(|value| value.to_bits()).collect()
+}
+
+/// Coloured, isotropic and forward: in all of space, and behind a boundary that the camera is outside of.
+#[test]
+fn fog_agrees_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        for scene in [fog_room(Phase::Isotropic), fog_room(FORWARD)] {
+            expect_agreement(gpu, &scene, SAMPLES, REFERENCE);
+        }
+        let mut boxed = builtin("builtin:fog-box?boxes=none&sigma_s=4&lamp=1");
+        boxed.name = "box of fog".into();
+        expect_agreement(gpu, &boxed, SAMPLES, REFERENCE);
+    });
+}
+
+/// Delta tracking to collisions and ratio tracking between them, alone and beside a homogeneous medium.
+#[test]
+fn grids_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        for around in [false, true] {
+            expect_agreement(gpu, &cloud(around), SAMPLES, REFERENCE);
+        }
+    });
+}
+
+/// A body of fog in fog, whose boundary paths pass straight, beside a glass ball filled with a coloured medium.
+#[test]
+fn bodies_in_fog_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = fog_body(FORWARD);
+        scene.name = "bodies in fog".into();
+        add_sphere(&mut scene, "glass", DVec3::new(-0.6, -0.2, 0.4));
+        let filling = scene.media.len() as u32;
+        scene.media.push(Medium {
+            sigma_s: Vec3::new(1.0, 0.5, 0.2),
+            sigma_a: Vec3::new(0.1, 0.3, 0.6),
+            ..Medium::default()
+        });
+        let glass = scene.materials.last_mut().expect("glass");
+        assert!(glass.transmission > 0.0 && glass.thickness > 0.0, "{glass:?}");
+        glass.interior = Some(filling);
+        scene.media.push(fog(Phase::Isotropic));
+        scene.surrounding = Some(filling + 1);
+        // Caustics of a point are found by light subpaths alone.
+        scene.lights.clear();
+        expect_agreement(gpu, &scene, SAMPLES, 4 * REFERENCE);
+    });
+}
+
+/// Eye paths alone find what a medium emits; what is emitted and scattered counts once.
+#[test]
+fn media_that_emit_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = fog_body(Phase::Isotropic);
+        scene.name = "glowing body".into();
+        scene.media[0].emission = Vec3::new(3.0, 2.0, 1.0);
+        expect_agreement(gpu, &scene, 2 * SAMPLES, REFERENCE);
+        let mut grid = cloud(false);
+        grid.name = "glowing cloud".into();
+        grid.media[0].emission = Vec3::new(1.0, 2.0, 3.0);
+        expect_agreement(gpu, &grid, 2 * SAMPLES, REFERENCE);
+    });
+}
+
+/// A closed box of walls that emit and reflect half of what arrives, in fog that absorbs nothing: the same radiance everywhere.
+#[test]
+fn furnaces_with_fog_are_even() {
+    with_gpu(|gpu| {
+        let mut scene = builtin("builtin:furnace-box?rho=0.5&emission=1");
+        scene.media.push(Medium {
+            sigma_s: Vec3::splat(1.0),
+            phase: FORWARD,
+            ..Medium::default()
+        });
+        scene.surrounding = Some(0);
+        for means in passes(gpu, &scene, &settings(), SAMPLES).means {
+            expect_mean_of("radiance", &means, 2.0, 0.0, 0.0);
+        }
+    });
+}
+
+/// Light that is scattered once, by fog or a wall, found by each way that can: by lamps that are met, by samples of the lamp, and by light subpaths that the camera sees.
+#[test]
+fn each_way_to_make_a_path_in_fog_finds_the_same_light() {
+    with_gpu(|gpu| {
+        // No collision is near the lamp or the camera, where a way alone has no bound.
+        let mut scene = fog_body(FORWARD);
+        scene.lights.clear();
+        let reference = traced(gpu, &scene, "bounces=1", 2 * REFERENCE);
+        for (strategies, samples) in [
+            (Strategies::Emission, 16 * SAMPLES),
+            (Strategies::LightSamples, 2 * SAMPLES),
+            (Strategies::Splats, 2 * SAMPLES),
+        ] {
+            let alone = BidirectionalSettings {
+                strategies,
+                light_paths: 1024,
+                least_bounces: 1,
+                most_bounces: Some(1),
+                ..settings()
+            };
+            let what = format!("{strategies:?}");
+            passes(gpu, &scene, &alone, samples).expect_same_as(&what, &reference);
+        }
+    });
+}
+
+/// The caustic that a glass ball throws into fog of a lamp that eye paths hardly ever meet: what photons bring there, blurred over their kernels, is what light subpaths bring.
+#[test]
+fn caustics_of_a_tiny_lamp_in_fog_are_those_of_photons() {
+    with_gpu(|gpu| {
+        let scene = builtin("builtin:fog-box?sphere=glass&boxes=none&lamp=0.1");
+        let set = "LS+VE".parse().expect("path set");
+        let own = BidirectionalSettings {
+            path_set: set,
+            light_paths: 1024,
+            ..settings()
+        };
+        let found = passes(gpu, &scene, &own, 512);
+        let photons = PhotonSettings {
+            path_set: set,
+            photons: 1 << 15,
+            seed: 5,
+            ..PhotonSettings::default()
+        };
+        let mut mapper = match PhotonMapper::new(gpu, upload(gpu, &scene), &scene.cameras[0], SIZE, photons) {
+            Ok(mapper) => mapper,
+            Err(error) => panic!("{error}"),
+        };
+        let [mapped, _] = advance(&mut mapper, 64);
+        for channel in 0..3 {
+            let expected = mean(&mapped, channel);
+            assert!(expected > 0.0);
+            let means = &found.means[channel];
+            let own = means.iter().sum::<f64>() / means.len() as f64;
+            println!("channel {channel}: {own} by both ends, {expected} by photons");
+            assert!((own / expected - 1.0).abs() < 0.1, "{own} instead of {expected}");
+        }
+    });
+}
+
+#[test]
+fn pictures_of_media_do_not_depend_on_how_the_work_is_cut_up() {
+    with_gpu(|gpu| {
+        for scene in [fog_body(Phase::Isotropic), cloud(true)] {
+            // Pixels that fill no workgroup.
+            let base = BidirectionalSettings {
+                light_paths: 200,
+                samples_at_once: 4,
+                connections: 3,
+                ..settings()
+            };
+            let of = |settings: &BidirectionalSettings| {
+                let mut renderer = renderer(gpu, &scene, [13, 7], settings);
+                (bits(&advance(&mut renderer, 5)), renderer.counts())
+            };
+            let done = |c: &BidirectionalCounts| {
+                [
+                    c.light_vertices,
+                    c.vertices_in_view,
+                    c.connections,
+                    c.shadow_rays,
+                    c.collisions,
+                ]
+            };
+            let (whole, counts) = of(&base);
+            assert!(done(&counts).iter().all(|count| *count > 100), "{counts:?}");
+            for (paths_in_flight, submission_work, ray_quota) in [(64, 0, 0), (0, 1, 0), (64, 64, 0), (0, 0, 3)] {
+                let settings = BidirectionalSettings {
+                    paths_in_flight,
+                    submission_work,
+                    ray_quota,
+                    ..base.clone()
+                };
+                let what = format!("{}: {paths_in_flight} {submission_work} {ray_quota}", scene.name);
+                let (parted, of_parted) = of(&settings);
+                assert_eq!(parted, whole, "{what}");
+                assert_eq!(done(&of_parted), done(&counts), "{what}");
+            }
+        }
+    });
+}
+
+#[test]
+fn threads_of_the_driver_never_show_in_media() {
+    let hash = |variables: &[(&str, &str)]| hash_in_child(CHILD_TEST, CHILD, variables);
+    let truth = hash(&[("LP_NUM_THREADS", "1")]);
+    assert_eq!(hash(&[("LP_NUM_THREADS", "2")]), truth);
+}
+
+#[test]
+fn prints_its_hash_when_asked() {
+    if std::env::var_os(CHILD).is_none() {
+        return;
+    }
+    let gpu = gpu();
+    let mut renderer = renderer(&gpu, &cloud(true), SIZE, &settings());
+    print_hash(bits(&advance(&mut renderer, 4)));
+    clerestory_tests::assert_no_messages(&gpu);
+}
+
+/// No kernel, no binding's bytes and no bit of a picture, also where a medium is described that nothing holds.
+#[test]
+fn scenes_without_media_have_nothing_of_them() {
+    with_gpu(|gpu| {
+        let mut scene = room();
+        add_lamp(&mut scene, 3.0);
+        let of = |scene: &Scene| {
+            let mut renderer = renderer(gpu, scene, SIZE, &settings());
+            let picture = bits(&advance(&mut renderer, 4));
+            let pipelines: Vec<_> = renderer.pipelines().iter().map(|info| info.shader).collect();
+            (picture, renderer.counts(), pipelines)
+        };
+        let plain = of(&scene);
+        scene.media.push(fog(Phase::Isotropic));
+        assert_eq!(of(&scene), plain);
+        let (_, counts, pipelines) = plain;
+        assert_eq!(counts.collisions, 0);
+        assert!(
+            pipelines.iter().all(|shader| !shader.contains("medium")),
+            "{pipelines:?}"
+        );
+        let in_fog = renderer(gpu, &fog_room(Phase::Isotropic), SIZE, &settings());
+        let of_media = |shader: &&str| shader.contains("medium");
+        let shaders: Vec<_> = in_fog.pipelines().iter().map(|info| info.shader).collect();
+        // Walks, eye paths, what joins them, and what the camera is shown.
+        assert_eq!(shaders.iter().copied().filter(of_media).count(), 4, "{shaders:?}");
+    });
+}
+
+#[test]
+fn what_media_have_no_light_subpaths_for_is_refused_by_name() {
+    with_gpu(|gpu| {
+        let mut sky = fog_room(Phase::Isotropic);
+        sky.environment = Some(Environment::uniform(Vec3::ONE));
+        let mut sun = fog_room(Phase::Isotropic);
+        sun.add_light(
+            "sun",
+            LightKind::Directional {
+                direction: -Vec3::Y,
+                irradiance: Vec3::ONE,
+            },
+        );
+        for scene in [sky, sun] {
+            let options = RenderOptions {
+                technique: Some("bdpt".into()),
+                ..RenderOptions::default()
+            };
+            let renderer = Renderer::new(gpu, &scene).expect("scene");
+            let error = renderer.start(&options).err().expect("a refusal");
+            assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+            assert!(error.to_string().contains("light from infinity"), "{error}");
+        }
+    });
+}
