@@ -163,6 +163,24 @@ mod tests {
         );
     }
 
+    /// Luminances over sixty stops, without those that have no part in it: the middle of a geometric sequence is that of its ends.
+    #[test]
+    fn the_middle_of_a_large_picture_is_its_geometric_mean() {
+        const COUNT: u32 = 1 << 20;
+        // In an order that has bright and dark ones all over.
+        let order = (0..COUNT).map(|i| i.wrapping_mul(0x9e37_79b1) % COUNT);
+        let stops = |i: u32| 60.0 * f64::from(i) / f64::from(COUNT - 1) - 20.0;
+        let mut luminances: Vec<f64> = order.map(|i| stops(i).exp2()).collect();
+        luminances.extend([0.0, f64::NAN, f64::INFINITY]);
+        let adaptation = Adaptation::to(&luminances, 0.0).expect("light");
+        let middle = KEY / adaptation.scale;
+        assert!((middle / 10f64.exp2() - 1.0).abs() < 1e-9, "{middle}");
+        // A stop more.
+        let doubled: Vec<f64> = luminances.iter().map(|l| 2.0 * l).collect();
+        let doubled = KEY / Adaptation::to(&doubled, 0.0).expect("light").scale;
+        assert!((doubled / middle - 2.0).abs() < 1e-9, "{doubled}");
+    }
+
     #[test]
     fn even_pictures_look_alike_and_brighter_is_never_darker() {
         for value in [1e-6, 1.0, 1e9] {

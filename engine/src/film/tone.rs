@@ -139,10 +139,11 @@ pub(crate) const ROWS: &[Row] = &[
         id: "SVO-P15",
         name: "tone reproduction by a picture's own brightness, for all pixels alike or by what is around each",
         role: Role::Service,
-        limits: "Of pictures in files alone, not of windows; scales are those of pixels, so that pictures of other sizes look somewhat different.",
+        limits: "Of pictures in files alone, not of windows: the mean of logarithms and what is around are found on the host, in f64, and no kernel reduces them on the device; scales are those of pixels, so that pictures of other sizes look somewhat different.",
         sources: &[sources::REINHARD_2002.whole(), sources::SUN_2015.at("§4.12")],
         tests: &[
             "engine/src/film/photographic.rs::the_middle_becomes_middle_grey_and_highlights_roll_off",
+            "engine/src/film/photographic.rs::the_middle_of_a_large_picture_is_its_geometric_mean",
             "engine/src/film/photographic.rs::even_pictures_look_alike_and_brighter_is_never_darker",
             "engine/src/film/photographic.rs::surroundings_are_the_same_at_every_exposure",
             "engine/src/film/photographic.rs::scaled_pictures_look_the_same",

@@ -216,6 +216,50 @@ fn points_that_coincide_bring_no_infinities() {
     });
 }
 
+/// As many walks as settings take may leave more virtual lights than a buffer holds; here fewer do, and a smaller one.
+#[test]
+fn lights_beyond_a_buffer_are_refused_with_their_number() {
+    const RANGE: u64 = 1 << 20;
+    /// Of a record.
+    const BYTES: u64 = 64;
+    const WALKS: u32 = 20_000;
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            max_storage_buffer_range: Some(RANGE),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
+    });
+    let many = VirtualLightSettings {
+        walks: WALKS,
+        most_bounces: 2,
+        ..settings()
+    };
+    let mut renderer = renderer(&gpu, &room(), [1, 1], &many);
+    let error = loop {
+        match renderer.step(1) {
+            Ok(Some(_)) => {}
+            Ok(None) => panic!("must be refused"),
+            Err(error) => break error,
+        }
+    };
+    let text = error.to_string();
+    let Error::Overflow {
+        kernel,
+        needed,
+        capacity,
+        ..
+    } = error
+    else {
+        panic!("{text}");
+    };
+    assert_eq!((kernel.as_str(), capacity), ("vpl_append", RANGE / BYTES));
+    // One of each walk, in a closed room.
+    assert_eq!(needed, u64::from(WALKS), "{text}");
+    assert!(text.contains("setting `walks`"), "{text}");
+    assert_no_messages(&gpu);
+}
+
 #[test]
 fn what_cannot_be_modelled_is_refused_by_name() {
     with_gpu(|gpu| {
@@ -236,6 +280,10 @@ fn what_cannot_be_modelled_is_refused_by_name() {
         let renderer = Renderer::new(gpu, &room()).expect("scene");
         for (settings, word) in [
             (serde_json::json!({ "walks": 0 }), "setting walks: 0"),
+            (
+                serde_json::json!({ "walks": 10_000_000 }),
+                "setting walks: 10000000 is out of range; it may be 1 … 1048576",
+            ),
             (serde_json::json!({ "bound": "sphere" }), "bound"),
             (serde_json::json!({ "bound_value": -1.0 }), "setting bound_value"),
             (serde_json::json!({ "path_set": "all" }), "no others"),

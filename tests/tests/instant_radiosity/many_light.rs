@@ -7,6 +7,7 @@ mod kept;
 mod metropolis;
 mod reflective;
 mod reservoirs;
+mod scales;
 mod tiles;
 mod truths;
 
@@ -293,6 +294,57 @@ fn what_is_not_needed_is_not_recorded() {
         // Nothing that is seen emits: a black picture, and the film.
         let (passes, _, kernels, bytes) = once(&of("emitted", exact()));
         assert_eq!((passes, kernels, bytes), (2, [false; 4], 0));
+    });
+}
+
+/// Where all surfaces scatter by Lambert's law kernels of virtual lights have no branch for anything else at either end, of `vpl` and of frames alike; a surface of another kind brings its own.
+#[test]
+fn lambert_ends_cost_no_branch() {
+    const OTHERS: [&str; 5] = [
+        "has_specular_layer",
+        "has_metal",
+        "has_transmission",
+        "has_shading_normals",
+        "has_normal_maps",
+    ];
+    with_gpu(|gpu| {
+        // The same in all kernels.
+        let branches = |ground: Material| {
+            let mut scene = hall();
+            scene.materials[0] = ground;
+            let of_vpl = renderer(gpu, &scene, [4; 2], &settings()).pipelines();
+            let of_frames = frames(gpu, &scene, [4; 2], &exact()).pipelines();
+            let found = [
+                (&of_vpl, "/vpl_append.comp"),
+                (&of_vpl, "/vpl_gather.comp"),
+                (&of_frames, "/vpl_append.comp"),
+                (&of_frames, "/deferred_gather.comp"),
+            ]
+            .map(|(pipelines, kernel)| {
+                let pipeline = pipelines.iter().find(|pipeline| pipeline.shader.ends_with(kernel));
+                let constants = &pipeline.expect(kernel).specialization;
+                OTHERS.map(|name| {
+                    let constant = constants.iter().find(|(other, _)| *other == name);
+                    constant.expect(name).1 != 0
+                })
+            });
+            assert!(found.iter().all(|others| *others == found[0]), "{found:?}");
+            found[0]
+        };
+        let matte = Material::lambert("ground", Vec3::splat(0.5));
+        assert_eq!(branches(matte.clone()), [false; 5]);
+        let coated = Material {
+            specular: 1.0,
+            roughness: 0.5,
+            ..matte
+        };
+        assert_eq!(branches(coated), [true, false, false, false, false]);
+        let metal = Material {
+            roughness: 0.6,
+            ..Material::mirror("ground", Vec3::splat(0.5))
+        };
+        assert_eq!(branches(metal), [false, true, false, false, false]);
+        assert!(branches(Material::glass("ground", 1.5))[2]);
     });
 }
 

@@ -2,6 +2,12 @@
 //!
 //! Places × lights are never stored: an invocation takes the lights of its place one after the other, as many a dispatch as the loops of the device allow, and
 //! goes on in the next one. So memory is that of the places, whatever the number of lights.
+//!
+//! Shadow rays are traced here, and in `deferred_gather` of `many-light`, by the traversal that the ray kernels of [`walk`](crate::walk) include, but not in their queues, which
+//! have a ray a place: with no more than eight bytes a pair, those of 192² pixels and 512 lights would take 151 MB, more than a buffer of the least devices, and a wave of all places for
+//! each light would write and read as many rays. Each place keeps a cursor instead (`GatherState`: its next light, and where that light's ray has stopped): a ray stops at a
+//! quota, a dispatch takes a bounded number of lights, and sweeps over the places that are left go on until none is, so that all loops stay below what software drivers run
+//! ([`SOFTWARE_LOOP_CAP`]).
 
 use super::medium_gather::{MediumGather, Over};
 use super::settings::{Selection, VirtualLightSettings};

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::*;
 use clerestory::transport::GpuScene;
+use glam::DAffine3;
 
 pub(super) fn kept() -> ManyLightSettings {
     ManyLightSettings {
@@ -43,7 +44,7 @@ fn closed_box() -> Scene {
     builtin("builtin:furnace-box?rho=0.5&emission=0")
 }
 
-/// A rendering whose lamps move.
+/// A rendering whose lamps and objects move.
 pub(super) struct Moving<'a> {
     gpu: &'a Gpu,
     /// Its first camera is looked through in the next frame.
@@ -79,6 +80,14 @@ impl<'a> Moving<'a> {
         let [radiance, _] = advance(&mut self.renderer, 1);
         let after = counts(&self.renderer);
         (radiance, [0, 1, 2].map(|i| after[i] - before[i]))
+    }
+
+    /// Puts an object to another place, for what is drawn and for rays.
+    pub fn put(&self, object: usize, to: DVec3) {
+        let to = DAffine3::from_translation(to);
+        let moved = self.on_device.move_object(self.gpu, &self.scene, object, to);
+        moved.expect("a place in the scene");
+        self.on_device.refit_index(self.gpu).expect("a wide index");
     }
 
     fn places(&self) -> BTreeSet<[u32; 3]> {

@@ -246,6 +246,8 @@ const ROWS: &[Row] = &[
             "tests/tests/raster/gbuffer.rs::positions_project_to_the_middles_of_their_pixels",
             "tests/tests/instant_radiosity/many_light.rs::frames_do_not_depend_on_how_work_is_shared_out",
             "tests/tests/instant_radiosity/many_light.rs::what_is_not_needed_is_not_recorded",
+            "tests/tests/instant_radiosity/many_light.rs::lambert_ends_cost_no_branch",
+            "tests/tests/instant_radiosity/many_light/scales.rs::frames_know_no_lengths",
             "tests/tests/instant_radiosity/many_light.rs::scenes_without_lights_are_black_and_walks_that_leave_do_no_harm",
             "tests/tests/instant_radiosity/many_light.rs::what_frames_cannot_model_is_refused_by_name",
         ],
@@ -480,7 +482,7 @@ const ROWS: &[Row] = &[
         id: "SVO-G4",
         name: "temporal coherence: indirect light blended with that of the frame before where the camera before saw the same surface, by a confidence that changes of position, normal and light lower",
         role: Role::PartOf("SVO-P12"),
-        limits: "Objects stand still, lamps and the camera move; light lags behind what changes and smears along surfaces that pixels move over; frames on a film are no independent samples; a frame without virtual lights ends the history.",
+        limits: "Points of objects that move are looked up where they are now, so that light follows what slides along its own surface, lags where that rises or turns, and is new where it does so by more in a frame than neighbours of one surface may differ; light lags behind what changes, shadows of what moves among it, and smears along surfaces that pixels move over; frames on a film are no independent samples; a frame without virtual lights ends the history.",
         sources: &[sources::SUN_2015.at("§2.2.4")],
         shaders: &[
             "shaders/techniques/instant_radiosity/deferred_history.comp",
@@ -501,6 +503,8 @@ const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/many_light/history.rs::steps_of_light_arrive_as_powers_of_the_confidence",
             "tests/tests/instant_radiosity/many_light/history.rs::what_was_hidden_has_no_confidence",
             "tests/tests/instant_radiosity/many_light/history.rs::ghosts_stay_near_what_was_hidden",
+            "tests/tests/instant_radiosity/many_light/history.rs::ghosts_stay_near_what_moves",
+            "tests/tests/instant_radiosity/many_light/history.rs::what_leaves_its_own_surface_has_no_confidence",
             "tests/tests/instant_radiosity/many_light/history.rs::changes_of_light_lower_the_confidence",
             "tests/tests/instant_radiosity/many_light/history.rs::single_bright_pixels_are_bounded",
             "tests/tests/instant_radiosity/many_light/history.rs::histories_cost_what_they_keep_and_nothing_where_there_are_none",
@@ -521,7 +525,7 @@ const ROWS: &[Row] = &[
         id: "SVO-B0",
         name: "shadow maps of virtual lights, exact ones of all triangles",
         role: Role::PartOf("SVO-P12"),
-        limits: "An octahedron of all directions for each light, of which its surface hides one half, where paraboloids and half octahedra have one texel for two; costs as lights times triangles; contact shadows begin a texel's diagonal late.",
+        limits: "An octahedron of all directions for each light, of which its surface hides one half, where paraboloids and half octahedra have one texel for two; costs as lights times triangles; contact shadows begin a texel's diagonal late; alpha and glass are opaque to maps: partial alpha is refused, and cut-outs are seen through in exact maps alone.",
         sources: &[
             sources::ENGELHARDT_DACHSBACHER_2008.whole(),
             sources::SUN_2015.at("§1 and §6"),
@@ -535,6 +539,7 @@ const ROWS: &[Row] = &[
         )),
         needs: &["VK_QUEUE_GRAPHICS_BIT", "shaderClipDistance"],
         tests: &[
+            "engine/src/techniques/instant_radiosity/many_light/maps.rs::maps_are_shared_out_by_what_a_buffer_holds",
             "tests/tests/instant_radiosity/many_light.rs::errors_of_visibility_fall_from_none_over_maps_to_rays",
             "tests/tests/instant_radiosity/many_light/truths.rs::squares_have_their_form_factors_behind_a_blocker",
             "tests/tests/instant_radiosity/many_light.rs::threads_and_widths_of_the_driver_never_show",

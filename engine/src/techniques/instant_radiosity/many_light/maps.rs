@@ -140,3 +140,39 @@ impl Maps {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A map of 128² texels has 64 KiB: 512 of them are as many as are there at once, 2,048 of kept lights fill a buffer of the least devices.
+    #[test]
+    fn maps_are_shared_out_by_what_a_buffer_holds() {
+        const BYTES: u64 = 4 * 128 * 128;
+        assert_eq!(BYTES, 65_536);
+        let at_once = |placement, lights, wanted, bytes| {
+            let settings = ManyLightSettings {
+                placement,
+                lights,
+                maps_at_once: wanted,
+                ..ManyLightSettings::default()
+            };
+            maps_at_once(&settings, bytes)
+        };
+        for placement in [Placement::Walks, Placement::Rsm, Placement::Metropolis] {
+            assert_eq!(at_once(placement, 2048, 0, BYTES), 512, "{placement:?}");
+            assert_eq!(at_once(placement, 511, 0, BYTES), 511, "{placement:?}");
+        }
+        for lights in [2047, 2048] {
+            assert_eq!(at_once(Placement::Incremental, lights, 0, BYTES), lights);
+        }
+        assert_eq!(at_once(Placement::Incremental, 2049, 0, BYTES), 2048);
+        assert_eq!(2048 * BYTES, 128 << 20);
+        // As many as are asked for, of the lights and of what there is room for; one that is larger than all of it, and maps of nothing.
+        assert_eq!(at_once(Placement::Walks, 2048, 7, BYTES), 7);
+        assert_eq!(at_once(Placement::Walks, 5, 7, BYTES), 5);
+        assert_eq!(at_once(Placement::Walks, 2048, 1024, BYTES), 512);
+        assert_eq!(at_once(Placement::Walks, 2048, 0, 1 << 40), 1);
+        assert_eq!(at_once(Placement::Walks, 2048, 0, 0), 2048);
+    }
+}

@@ -36,7 +36,8 @@
 //! - *Reservoirs.* None of their own: what neighbours keep is weighted by the chance that each pixel had to keep it.
 //! - *History.* Light that is blended with that of the frame before lags behind what changes: of a step 1 - cᵏ are there after k frames where the confidence stays c. Noise lowers the
 //!   confidence, too, by bright frames and dark ones alike, and what is bounded for a history is missing. Where pixels move over surfaces light is blurred along these by parts of a pixel a frame.
-//!   Objects stand still for it: of one that was moved ([`GpuScene::move_object`](crate::transport::GpuScene::move_object)) light is looked up where its points are now.
+//!   Of an object that was moved ([`GpuScene::move_object`](crate::transport::GpuScene::move_object)) light is looked up where its points are now: it follows what slides along its own
+//!   surface, lags where that rises or turns, and is new where it does so by more in a frame than `filter_plane` and `filter_normal` let neighbours differ. Shadows of what moves lag as all light does.
 //! - *Edges.* Rasterizers round corners to parts of a pixel (1/256 here): what is seen at a silhouette may be what lies behind, as far beside it, even where that is inside
 //!   of a closed body.
 //!

@@ -338,7 +338,7 @@ impl ManyLight {
 
     /// Looks through another camera, or the same, and begins anew, also where a light has [moved](GpuScene::move_light). Virtual lights that are kept stay
     /// ([`Placement::Incremental`]), and their shadow maps: where an object has moved, [`restart`](Self::restart) instead. So does the light of the last frame
-    /// ([`ManyLightSettings::history`]).
+    /// ([`ManyLightSettings::history`]), also where an object has moved, of whose points it is looked up where they are now.
     ///
     /// # Errors
     /// [`Error::Setting`] for a camera that cannot be used, [`Error::DeviceLost`].
