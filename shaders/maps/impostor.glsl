@@ -88,18 +88,21 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
         // A point that the map's place does not see is no bracket.
         is_at_point = is_at_point || g <= 1.0;
     }
+    // The hybrid looks its other beginning up in a turn more of the loop below, without a bracket yet: drivers that follow branches with all lanes would look it up for rays that need it not.
+    bool begins_in_loop = IMPOSTOR_METHOD == IMPOSTOR_HYBRID && !is_at_point;
     float begin = is_at_point ? 0.0 : across;
-    if (!is_at_point) {
+    if (IMPOSTOR_METHOD != IMPOSTOR_HYBRID && !is_at_point) {
         g = impostor_ratio(layer, x, r, begin);
     }
     vec2 last = vec2(begin, g);
     // As printed, false position takes its point for one in front.
-    bool has_under = g < 1.0 || is_at_point;
-    bool has_over = !has_under;
+    bool has_under = !begins_in_loop && (g < 1.0 || is_at_point);
+    bool has_over = !begins_in_loop && !has_under;
     vec2 under = last;
     vec2 over = last;
-    d = clamp(begin + impostor_step(last, false, last, far), 0.0, reach);
-    [[dont_unroll]] for (uint i = 0u; i < IMPOSTOR_STEPS; ++i) {
+    d = begins_in_loop ? begin : clamp(begin + impostor_step(last, false, last, far), 0.0, reach);
+    uint turns = begins_in_loop ? IMPOSTOR_STEPS + 1u : IMPOSTOR_STEPS;
+    [[dont_unroll]] for (uint i = 0u; i < turns; ++i) {
         vec2 guess = vec2(d, impostor_ratio(layer, x, r, d));
         vec2 other = last;
         bool has_other = true;

@@ -2,6 +2,12 @@
 #ifndef CLERESTORY_MAPS_PROXY_GLSL
 #define CLERESTORY_MAPS_PROXY_GLSL
 
+// Shapes of what stands in for the surroundings.
+const uint PROXY_NONE = 0u;
+const uint PROXY_SPHERE = 1u;
+const uint PROXY_BOX = 2u;
+const uint PROXY_HEMISPHERE = 3u;
+
 // Farther than any wall: that of one that a ray runs along.
 const float PROXY_FAR = 3e38;
 

@@ -19,6 +19,7 @@ layout(push_constant, scalar) uniform Push {
     vec3 f0;
     vec3 a;
     vec3 alpha;
+    vec2 cosines;  // of the first invocation and of the last
 } push;
 
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Table { vec4 curve_table[]; };
@@ -73,7 +74,7 @@ void main() {
     if (i >= push.count) {
         return;
     }
-    float c = float(i) / float(push.count - 1u);
+    float c = push.cosines.x + (push.cosines.y - push.cosines.x) * (float(i) / float(push.count - 1u));
     vec3 value = curve_at(c);
     for (uint j = 1u; j < CURVE_CHAIN; ++j) {
         c = fract(c + CURVE_STEP * (value.x + value.y + value.z));

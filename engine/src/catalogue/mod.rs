@@ -39,7 +39,8 @@ pub const PREFIXES: [(&str, &str); 7] = [
     ),
     (
         "MET-",
-        "a doctoral thesis on metals and reflections on graphics hardware: MET-B basics of scattering, MET-F Fresnel terms, MET-V virtual lights",
+        "a doctoral thesis on metals and reflections on graphics hardware: MET-B basics of scattering, MET-D distance impostors, \
+         MET-E baselines of reflections, MET-F Fresnel terms, MET-G gathers of the light of nearby walls, MET-P previous work, MET-V virtual lights",
     ),
     (
         "SVO-",

@@ -226,6 +226,20 @@ impl Caps {
         })
     }
 
+    /// Fails for more texels than a texel buffer may have, whatever their size.
+    pub(crate) fn check_texels(&self, name: &str, texels: u64) -> Result<()> {
+        let limit = self.max_texel_buffer_elements;
+        if texels <= limit {
+            return Ok(());
+        }
+        Err(Error::LimitExceeded {
+            name: name.into(),
+            value: texels,
+            limit_name: "maxTexelBufferElements",
+            limit,
+        })
+    }
+
     /// Lowers what was read to what a test pretends.
     pub(super) fn pretend(&mut self, lesser: &Lesser) {
         if let Some(descriptors) = lesser.descriptors {

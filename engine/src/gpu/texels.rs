@@ -79,15 +79,7 @@ impl Gpu {
     ) -> Result<TexelView> {
         let texel = texel_size(name, format)?;
         let texels = texels.max(1);
-        let limit = self.caps().max_texel_buffer_elements;
-        if texels > limit {
-            return Err(Error::LimitExceeded {
-                name: name.into(),
-                value: texels,
-                limit_name: "maxTexelBufferElements",
-                limit,
-            });
-        }
+        self.caps().check_texels(name, texels)?;
         let buffer = self.buffer(&BufferDesc {
             name,
             bytes: texels * texel,
@@ -118,15 +110,7 @@ impl Gpu {
             let cause = format!("has no texels in the buffer {:?}", buffer.name());
             return Err(Error::setting("format", format!("{format:?}"), cause));
         }
-        let limit = self.caps().max_texel_buffer_elements;
-        if texels > limit {
-            return Err(Error::LimitExceeded {
-                name: buffer.name().into(),
-                value: texels,
-                limit_name: "maxTexelBufferElements",
-                limit,
-            });
-        }
+        self.caps().check_texels(buffer.name(), texels)?;
         self.make_texel_view(buffer.name(), buffer, format, texels * texel)
     }
 

@@ -276,7 +276,9 @@ fn rays_that_are_none_find_nothing_in_the_kernel() {
             ([9e15, -9e15, 9e15], good.1),
         ]
         .map(|(origin, direction)| ImpostorQuery { origin, direction });
-        let queries = gpu.buffer_with("rays", Category::Work, &rays).unwrap();
+        let queries = gpu
+            .texels_with("rays", Category::Work, ImpostorSearch::RAYS, &rays)
+            .unwrap();
         let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
         let hits = gpu.buffer(&BufferDesc::storage("hits", bytes, Category::Work)).unwrap();
         for method in [SearchMethod::Hybrid, SearchMethod::March] {
@@ -284,7 +286,7 @@ fn rays_that_are_none_find_nothing_in_the_kernel() {
             let mut recorder = gpu.recorder("none").unwrap();
             recorder
                 .pass("none", |pass| {
-                    search.record(pass, &impostor, queries.view(), hits.view(), rays.len() as u32)
+                    search.record(pass, &impostor, &queries, hits.view(), rays.len() as u32)
                 })
                 .unwrap();
             recorder.submit().unwrap().wait().unwrap();
@@ -377,11 +379,13 @@ fn what_cannot_be_searched_is_refused_by_name() {
         // A search is made for one kind of impostor.
         let search = ImpostorSearch::new(gpu, &impostor, &settings).unwrap();
         let layered = Impostor::new(gpu, &image(2, true)).unwrap();
-        let buffer = gpu.buffer_with("rays", Category::Work, &[0u32; 64]).unwrap();
+        let none = gpu.texels_with("rays", Category::Work, ImpostorSearch::RAYS, &[0u32; 32]);
+        let (none, hits) = (
+            none.unwrap(),
+            gpu.buffer_with("hits", Category::Work, &[0u32; 32]).unwrap(),
+        );
         let mut recorder = gpu.recorder("refused").unwrap();
-        let refused = recorder.pass("refused", |pass| {
-            search.record(pass, &layered, buffer.slice(0, 128), buffer.slice(128, 128), 1)
-        });
+        let refused = recorder.pass("refused", |pass| search.record(pass, &layered, &none, hits.view(), 1));
         assert!(refused.unwrap_err().to_string().contains("differs in map"));
         // One for maps with a surface everywhere sees none of the sky; one for others searches these, too.
         let open = ImpostorImage::from_fn(Parametrization::Cube, UVec2::splat(8), 1, false, |d| {

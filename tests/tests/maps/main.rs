@@ -4,3 +4,4 @@ mod directional_maps;
 mod gathers;
 mod impostor_texels;
 mod impostors;
+mod proxies;

@@ -2,6 +2,7 @@
 
 use clerestory::scene::metals::{self, artistic::artistic_index};
 use clerestory::transport::fresnel::compensated::{fresnel_compensated, fresnel_compensated_average};
+use clerestory::transport::fresnel::curve::{CurveForm, FresnelCurve};
 use clerestory::transport::fresnel::fresnel_conductor;
 use clerestory::transport::fresnel::rescaled::{conductor_f0, fresnel_rescaled, fresnel_schlick_average};
 use clerestory::transport::fresnel::simplified::fresnel_simplified;
@@ -215,5 +216,24 @@ fn microfacets_agree_with_their_twins() {
                 assert!(difference <= bound, "{difference:e} > {bound:e}, {x:?}");
             }
         }
+    });
+}
+
+/// Cosines that are given are those of a curve: the same bits where these are even, and the factor there.
+#[test]
+fn curves_are_evaluated_at_the_cosines_that_are_given() {
+    with_gpu(|gpu| {
+        let gold = metals::by_name("gold").expect("metal");
+        let curve = FresnelCurve::new(gpu, CurveForm::Exact, &gold, 1).expect("curve");
+        let (even, _) = curve.run(gpu, 5).expect("run");
+        assert_eq!(curve.run_at(gpu, &[0.0, 0.25, 0.5, 0.75, 1.0]).expect("run"), even);
+        for cosine in [0.013, 0.9] {
+            let found = curve.run_at(gpu, &[cosine]).expect("run")[0];
+            let exact = fresnel_conductor(cosine, gold.eta.as_dvec3(), gold.k.as_dvec3()).to_array();
+            for (found, exact) in found.into_iter().zip(exact) {
+                assert!((f64::from(found) - exact).abs() < 1e-6, "{cosine}: {found} {exact}");
+            }
+        }
+        assert!(curve.run_at(gpu, &[]).expect("run").is_empty());
     });
 }

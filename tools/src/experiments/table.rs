@@ -140,9 +140,29 @@ impl Table {
         })
     }
 
+    /// The same with some columns alone, in their order and without notes; `None` where one of them is missing.
+    pub fn columns(&self, heads: &[&str]) -> Option<Self> {
+        let place = |head: &&str| self.heads.iter().position(|own| own == head);
+        let places: Vec<usize> = heads.iter().map(place).collect::<Option<_>>()?;
+        let mut table = Self::new(self.title.as_str(), heads);
+        for row in &self.rows {
+            table.row(places.iter().filter_map(|place| row.get(*place).cloned()));
+        }
+        Some(table)
+    }
+
     /// As Markdown below a heading of the second level.
     pub fn markdown(&self) -> String {
-        let mut text = format!("## {}\n\n| {} |\n|", self.title, self.heads.join(" | "));
+        let mut text = format!("## {}\n\n{}", self.title, self.grid());
+        for note in &self.notes {
+            text.push_str(&format!("\n{note}\n"));
+        }
+        text
+    }
+
+    /// As Markdown without title and notes.
+    pub fn grid(&self) -> String {
+        let mut text = format!("| {} |\n|", self.heads.join(" | "));
         for (column, _) in self.heads.iter().enumerate() {
             let words = self
                 .rows
@@ -154,9 +174,6 @@ impl Table {
         for row in &self.rows {
             let cells: Vec<String> = row.iter().map(|cell| cell.to_string().replace('|', "\\|")).collect();
             text.push_str(&format!("| {} |\n", cells.join(" | ")));
-        }
-        for note in &self.notes {
-            text.push_str(&format!("\n{note}\n"));
         }
         text
     }

@@ -30,6 +30,9 @@ pub struct Impostor {
 }
 
 impl Impostor {
+    /// What its texels are called among buffers. They are read as texels, so that their number is bound, and not their bytes.
+    pub(crate) const TEXELS: &'static str = "impostor: texels";
+
     /// Uploads an image, with normals as planes.
     ///
     /// # Errors
@@ -50,7 +53,7 @@ impl Impostor {
             size: image.size().as_ivec2().to_array(),
             extent: image.extent(),
         };
-        let name = "impostor: texels";
+        let name = Self::TEXELS;
         let (planes, normals) = match texels {
             ImpostorTexels::Planes => (image.planes(), None),
             ImpostorTexels::Normals => (None, image.normals()),
@@ -121,7 +124,7 @@ impl Impostor {
     ///
     /// # Errors
     /// [`Error::Setting`] for settings out of range, for a ray whose direction is no unit vector, and for one that does not begin nearer than
-    /// [`ImpostorImage::NOTHING`]; [`Error::DeviceLost`], [`Error::OutOfMemory`].
+    /// [`ImpostorImage::NOTHING`]; [`Error::LimitExceeded`] for more rays than a texel buffer has; [`Error::DeviceLost`], [`Error::OutOfMemory`].
     pub fn search(&self, rays: &[ImpostorRay], settings: &ImpostorSettings) -> Result<Vec<ImpostorHit>> {
         let search = ImpostorSearch::new(&self.gpu, self, settings)?;
         search.search_timed(self, rays).map(|(hits, _)| hits)
@@ -156,6 +159,9 @@ pub struct ImpostorSearch {
 }
 
 impl ImpostorSearch {
+    /// The texels of rays, three a ray.
+    pub const RAYS: vk::Format = vk::Format::R32G32_SFLOAT;
+
     /// Makes the pipeline for impostors as this one.
     ///
     /// # Errors
@@ -191,19 +197,19 @@ impl ImpostorSearch {
     /// What rays meet, in their order, with the time of the search on the device in seconds. A software device compiles its kernel within the first one.
     ///
     /// # Errors
-    /// As [`Impostor::search`] and [`ImpostorSearch::record`].
+    /// As [`Impostor::search`] and [`ImpostorSearch::record`]; [`Error::LimitExceeded`] for more rays than a texel buffer has.
     pub fn search_timed(&self, impostor: &Impostor, rays: &[ImpostorRay]) -> Result<(Vec<ImpostorHit>, f64)> {
         let queries = queries(rays)?;
         if rays.is_empty() {
             return Ok((Vec::new(), 0.0));
         }
         let gpu = &impostor.gpu;
-        let queries = gpu.buffer_with("impostor: rays", Category::Work, &queries)?;
+        let queries = gpu.texels_with("impostor: rays", Category::Work, Self::RAYS, &queries)?;
         let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
         let hits = gpu.buffer(&BufferDesc::storage("impostor: hits", bytes, Category::Work))?;
         let mut recorder = gpu.recorder("impostor")?;
         recorder.pass("impostor: search", |pass| {
-            self.record(pass, impostor, queries.view(), hits.view(), rays.len() as u32)
+            self.record(pass, impostor, &queries, hits.view(), rays.len() as u32)
         })?;
         let seconds = recorder.submit()?.wait()?.seconds();
         let hits: Vec<DeviceHit> = gpu.read(hits.view(), rays.len())?;
@@ -216,8 +222,8 @@ impl ImpostorSearch {
         Ok((hits.into_iter().map(hit).collect(), seconds))
     }
 
-    /// Records the search for `count` rays of the type [`ImpostorQuery`] into hits of the type [`DeviceHit`](crate::gpu::shaders::types::ImpostorHit),
-    /// in the rays' order.
+    /// Records the search for `count` rays of the type [`ImpostorQuery`], which are read by texels of the format [`RAYS`](Self::RAYS), into hits of the type
+    /// [`DeviceHit`](crate::gpu::shaders::types::ImpostorHit), in the rays' order.
     ///
     /// Barriers: the rays must have been made visible to [`Access::COMPUTE`](crate::gpu::Access::COMPUTE), and earlier uses of the hits must have
     /// ended. After it the hits have been written by a compute shader.
@@ -229,7 +235,7 @@ impl ImpostorSearch {
         &self,
         pass: &mut Pass<'_>,
         impostor: &Impostor,
-        rays: BufferView<'_>,
+        rays: &TexelView,
         hits: BufferView<'_>,
         count: u32,
     ) -> Result<()> {

@@ -37,15 +37,7 @@ pub struct ImpostorImage {
 
 /// Refuses maps that impostors do not have, and numbers of layers.
 pub(super) fn check(map: Parametrization, size: UVec2, layers: u32) -> Result<()> {
-    let has_texels = matches!(
-        map,
-        Parametrization::Cube
-            | Parametrization::OctahedronQuadratic
-            | Parametrization::OctahedronRectangular
-            | Parametrization::EqualArea
-            | Parametrization::LatLong
-    );
-    if !has_texels {
+    if !ImpostorImage::has_texels(map) {
         let cause = "has no impostors; the cube, octahedra with c = 1, and maps of one rectangle have";
         return Err(Error::setting("map", map, cause));
     }
@@ -87,6 +79,18 @@ impl ImpostorImage {
     pub const NOTHING: f32 = IMPOSTOR_NOTHING;
     /// The least distance of a surface: ratios to it are finite too.
     pub const LEAST: f32 = 1e-16;
+
+    /// Whether a map can be one: those whose texels all hold directions, but for perspective octahedra.
+    pub(super) fn has_texels(map: Parametrization) -> bool {
+        matches!(
+            map,
+            Parametrization::Cube
+                | Parametrization::OctahedronQuadratic
+                | Parametrization::OctahedronRectangular
+                | Parametrization::EqualArea
+                | Parametrization::LatLong
+        )
+    }
 
     /// An impostor of its texels: layer of surfaces by layer, each layer by layer of the map, row by row.
     ///

@@ -9,7 +9,7 @@
 //!
 //! - [`ImpostorImage`]: distances and normals on the host, [`Impostor`] on the device, whose texels hold planes, normals or distances alone ([`ImpostorTexels`]);
 //! - [`ImpostorSettings`]: the method and its steps; [`ImpostorImage::search`] and [`Impostor::search`]: what rays meet, one by one and in batches;
-//! - [`proxy`]: spheres, boxes and a hemisphere in place of distances; [`places`]: which maps serve a point;
+//! - [`proxy`]: spheres, boxes and a hemisphere in place of distances; [`places`]: which maps serve a point; [`proxy_maps`]: both on the device;
 //! - [`views`]: several maps together, blended by what each of them sees;
 //! - [`room`]: rooms with exact answers, which searches are measured by, with the errors of [`published`] searches there; [`layouts`]: what the layout of texels is measured by.
 //!
@@ -28,6 +28,7 @@
 pub mod layouts;
 pub mod places;
 pub mod proxy;
+pub mod proxy_maps;
 pub mod published;
 pub mod room;
 pub mod views;
@@ -107,6 +108,7 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/maps/impostors.rs::the_sky_is_seen_in_the_rays_own_direction",
             "tests/tests/maps/impostors.rs::what_cannot_be_searched_is_refused_by_name",
             "tests/tests/maps/impostor_texels.rs::distances_beyond_a_texel_buffer_are_refused",
+            "tests/tests/maps/impostor_texels.rs::planes_beyond_a_storage_buffers_range_are_looked_up",
         ],
         api: &[
             "clerestory::maps::impostor::Impostor",
@@ -247,7 +249,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "MET-D9",
         name: "distances in a buffer of their own, beside radiance and normals",
         role: Role::PartOf("MET-D1"),
-        limits: "What it is measured against, four numbers a texel with the distance as the fourth, is there for one layer without normals alone.",
+        limits: "Up to a ninth slower on a software driver than four numbers a texel with the distance as the fourth, whose fetch brings the radiance into the cache, and which is there for one layer without normals alone; a texture cache's bandwidth, which it saves, is not what bounds that driver.",
         sources: &[sources::SZIRMAY_KALOS_2005.whole()],
         shaders: &["shaders/maps/impostor_set.glsl", "shaders/maps/impostor_layouts.comp"],
         bias: None,

@@ -87,15 +87,18 @@ pub(crate) const ROWS: &[Row] = &[Row {
     role: Role::Kernel,
     limits: "The nearest map changes at once half-way between places, and blends show both maps' parallax.",
     sources: &[sources::SZIRMAY_KALOS_2009.whole()],
-    shaders: &["shaders/maps/map_places.glsl"],
+    shaders: &["shaders/maps/map_places.glsl", "shaders/maps/proxy_look_up.comp"],
     tests: &[
         "engine/src/maps/impostor/tests/proxies.rs::the_nearest_map_jumps_and_the_blend_does_not",
         "engine/src/maps/impostor/tests/proxies.rs::places_that_are_none_are_refused",
         "tests/tests/twins/impostors.rs::maps_are_chosen_as_their_twins_say",
+        "tests/tests/maps/proxies.rs::two_maps_are_looked_up_and_blended",
+        "tests/tests/maps/proxies.rs::maps_and_shapes_that_are_none_are_refused",
     ],
     api: &[
         "clerestory::maps::impostor::places::nearest_map",
         "clerestory::maps::impostor::places::blended_maps",
+        "clerestory::maps::impostor::proxy_maps::ProxyMaps",
     ],
     ..Row::of(file!())
 }];

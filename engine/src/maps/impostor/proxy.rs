@@ -67,17 +67,19 @@ pub(crate) const ROWS: &[Row] = &[
             sources::BJORKE_2004.at("chapter 19"),
             sources::LAGARDE_ZANUTTINI_2012.whole(),
         ],
-        shaders: &["shaders/maps/proxy.glsl"],
+        shaders: &["shaders/maps/proxy.glsl", "shaders/maps/proxy_look_up.comp"],
         tests: &[
             "engine/src/maps/impostor/tests/proxies.rs::a_box_is_exact_in_its_room",
             "engine/src/maps/impostor/tests/proxies.rs::spheres_err_as_published",
             "engine/src/maps/impostor/tests/proxies.rs::proxies_behind_a_ray_and_rays_along_walls_give_finite_distances",
             "tests/tests/twins/impostors.rs::proxies_agree_with_their_twins",
+            "tests/tests/maps/proxies.rs::shapes_are_looked_up_as_their_twins_say",
             "tests/tests/impostor_pictures/reflections.rs::a_box_is_exact_in_a_box",
         ],
         api: &[
             "clerestory::maps::impostor::proxy::sphere_proxy",
             "clerestory::maps::impostor::proxy::box_proxy",
+            "clerestory::maps::impostor::proxy_maps::ProxyMaps",
         ],
         ..Row::of(file!())
     },
@@ -87,12 +89,16 @@ pub(crate) const ROWS: &[Row] = &[
         role: Role::Kernel,
         limits: "Exact for rays at a right angle to the ground alone.",
         sources: &[sources::SZIRMAY_KALOS_2009.whole()],
-        shaders: &["shaders/maps/proxy.glsl"],
+        shaders: &["shaders/maps/proxy.glsl", "shaders/maps/proxy_look_up.comp"],
         tests: &[
             "engine/src/maps/impostor/tests/proxies.rs::a_hemisphere_is_exact_for_rays_that_rise",
             "tests/tests/twins/impostors.rs::proxies_agree_with_their_twins",
+            "tests/tests/maps/proxies.rs::shapes_are_looked_up_as_their_twins_say",
         ],
-        api: &["clerestory::maps::impostor::proxy::hemisphere_proxy"],
+        api: &[
+            "clerestory::maps::impostor::proxy::hemisphere_proxy",
+            "clerestory::maps::impostor::proxy_maps::ProxyMaps",
+        ],
         ..Row::of(file!())
     },
 ];

@@ -148,6 +148,11 @@ pub(in crate::techniques) struct CapturePlan {
 }
 
 impl CapturePlan {
+    /// Texels of all layers.
+    pub fn texels(&self) -> u64 {
+        u64::from(self.layers) * u64::from(self.side) * u64::from(self.side)
+    }
+
     /// Bytes of a layer's radiance.
     fn layer_bytes(&self) -> u64 {
         u64::from(self.side) * u64::from(self.side) * size_of::<[f32; 3]>() as u64

@@ -15,7 +15,7 @@ use super::stage::{LookUp, LookUpCounts, ReflectionStage, Reflections};
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
-use crate::maps::impostor::ImpostorTexels;
+use crate::maps::impostor::{Impostor, ImpostorTexels};
 use crate::raster::ObjectTriangles;
 use crate::scene::Camera;
 use crate::settings::TypedSettings;
@@ -127,7 +127,7 @@ impl ImpostorReflections {
     ///
     /// # Errors
     /// [`Error::Setting`] for a setting or size out of range, for a place far outside of the scene, for a reflector that is none, and for a method without distances where bodies absorb; [`Error::Unsupported`] for a scene with participating media, with
-    /// surfaces that transmit, unless rays are to be [refracted](ReflectionSettings::refracts), or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
+    /// surfaces that transmit, unless rays are to be [refracted](ReflectionSettings::refracts), or that keeps its instances, and for light that a rasterized map lacks where one is asked for; [`Error::LimitExceeded`] for a map of more texels than the device's buffers have; [`Error::MissingFeature`] where clip distances are missing and there is something that reflects;
     /// [`Error::OutOfMemory`].
     pub fn new(
         gpu: &Gpu,
@@ -189,6 +189,10 @@ impl ImpostorReflections {
             sampler: settings.sampler,
         };
         let has_reflector = !plan.left_out.is_empty();
+        if has_reflector && plan.with_distances {
+            // Not after a map that takes long.
+            gpu.caps().check_texels(Impostor::TEXELS, plan.texels())?;
+        }
         let capture = has_reflector.then(|| Capture::new(gpu, &scene, plan)).transpose()?;
         let (path_set, eye) = (settings.path_set()?, settings.eye_paths()?);
         let eye_settings = eye_settings(eye, settings.sampler, settings.seed, settings.aovs);

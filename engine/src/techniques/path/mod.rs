@@ -610,7 +610,7 @@ pub(crate) const ROWS: &[Row] = &[
     },
     Row {
         id: "MET-E7",
-        name: "rays as the reference of reflections: direct light, and direct light in a mirror, `LE|L.E|L.SE`",
+        name: "rays through an index in compute kernels (MET-P2) as the reference of reflections: direct light, and direct light in a mirror, `LE|L.E|L.SE`",
         role: Role::PartOf("BG-3"),
         limits: "Noise, where lights have an extent.",
         sources: &[sources::KAJIYA_1986.whole(), sources::SZIRMAY_KALOS_2005.whole()],

@@ -183,7 +183,7 @@ const LENGYEL_2005: Source = Source {
 /// Rows of the catalogue.
 pub(super) const ROWS: &[Row] = &[Row {
     id: "MET-E6",
-    name: "planar mirrors: a picture by the camera that the plane mirrors, cut off at the plane",
+    name: "planar mirrors: a picture by the camera that the plane mirrors, cut off at the plane (MET-P3)",
     role: Role::PartOf("CL-PREVIEW"),
     limits: "A pass for each plane, and for each mirror in a mirror; hosts multiply by what the surface mirrors and put the pictures together.",
     sources: &[

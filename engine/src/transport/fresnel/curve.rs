@@ -80,6 +80,9 @@ impl CurveForm {
 /// Most evaluations of an invocation: below the driver's cap on loops with room to spare.
 const CHAIN_MAX: u32 = 4096;
 
+/// From grazing to normal incidence.
+const ALL_COSINES: [f32; 2] = [0.0, 1.0];
+
 /// The kernel for one form of one metal.
 #[derive(Debug)]
 pub struct FresnelCurve {
@@ -128,6 +131,7 @@ impl FresnelCurve {
                 f0,
                 a,
                 alpha,
+                cosines: ALL_COSINES,
             },
             table: gpu.buffer_with("Fresnel table", Category::Work, &nodes)?,
         })
@@ -140,6 +144,10 @@ impl FresnelCurve {
     /// # Errors
     /// [`Error::Setting`] for fewer than two invocations; as [`Pass::dispatch`].
     pub fn record(&self, pass: &mut Pass<'_>, values: BufferView<'_>, count: u32) -> Result<()> {
+        self.record_between(pass, values, count, ALL_COSINES)
+    }
+
+    fn record_between(&self, pass: &mut Pass<'_>, values: BufferView<'_>, count: u32, cosines: [f32; 2]) -> Result<()> {
         if count < 2 {
             return Err(Error::setting("count", count, "is below 2"));
         }
@@ -147,7 +155,11 @@ impl FresnelCurve {
             table: self.table.view(),
             values,
         };
-        let push = kernel::Push { count, ..self.push };
+        let push = kernel::Push {
+            count,
+            cosines,
+            ..self.push
+        };
         pass.dispatch(&self.pipeline, &[&set], &push, self.pipeline.groups_over(count))
     }
 
@@ -156,10 +168,28 @@ impl FresnelCurve {
     /// # Errors
     /// As [`FresnelCurve::record`], and those of the device.
     pub fn run(&self, gpu: &Gpu, count: u32) -> Result<(Vec<[f32; 3]>, f64)> {
+        self.run_between(gpu, count, ALL_COSINES)
+    }
+
+    /// The results of as many invocations as there are cosines, which need not be even: a dispatch for each of them.
+    ///
+    /// # Errors
+    /// As [`FresnelCurve::run`].
+    pub fn run_at(&self, gpu: &Gpu, cosines: &[f64]) -> Result<Vec<[f32; 3]>> {
+        let of = |cosine: &f64| {
+            let (values, _) = self.run_between(gpu, 2, [*cosine as f32; 2])?;
+            Ok(values[0])
+        };
+        cosines.iter().map(of).collect()
+    }
+
+    fn run_between(&self, gpu: &Gpu, count: u32, cosines: [f32; 2]) -> Result<(Vec<[f32; 3]>, f64)> {
         let bytes = u64::from(count) * size_of::<[f32; 3]>() as u64;
         let values = gpu.buffer(&BufferDesc::storage("Fresnel values", bytes, Category::Work))?;
         let mut recorder = gpu.recorder("Fresnel curve")?;
-        recorder.pass("Fresnel curve", |pass| self.record(pass, values.view(), count))?;
+        recorder.pass("Fresnel curve", |pass| {
+            self.record_between(pass, values.view(), count, cosines)
+        })?;
         let seconds = recorder.submit()?.wait()?.seconds();
         Ok((gpu.read(values.view(), count as usize)?, seconds))
     }

@@ -133,6 +133,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "engine/src/transport/fresnel/form.rs::seams_are_as_high_as_published",
         "engine/src/transport/fresnel/form.rs::averages_are_as_published",
         "engine/src/transport/bsdf/tests.rs::metals_reflect_by_the_form_they_name",
+        "tests/tests/twins/fresnel_forms.rs::curves_are_evaluated_at_the_cosines_that_are_given",
     ],
     shaders: &["shaders/transport/fresnel_curve.comp"],
     experiment: "clerestory metal gold",

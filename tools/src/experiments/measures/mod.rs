@@ -116,7 +116,7 @@ measures! {
     on_device "fresnel-cost" surfaces::fresnel_cost;
     on_host "fresnel-dielectric" surfaces::fresnel_dielectric;
     on_device "fresnel-forms" surfaces::fresnel_forms;
-    on_host "fresnel-seam" surfaces::fresnel_seam;
+    on_device "fresnel-seam" surfaces::fresnel_seam;
     on_host "fresnel-stripes" surfaces::fresnel_stripes;
     on_host "fuzzing" files::fuzzing;
     on_device "gather-counts" impostors::gather_counts;

@@ -5,8 +5,7 @@
 use clerestory::Result;
 use clerestory::gpu::Gpu;
 use clerestory::maps::impostor::layouts::{ImpostorLayout, ImpostorLayouts};
-use clerestory::maps::impostor::places::blended_maps;
-use clerestory::maps::impostor::proxy::{box_proxy, hemisphere_proxy, sphere_proxy};
+use clerestory::maps::impostor::proxy_maps::{ProxyHit, ProxyMaps, ProxyShape};
 use clerestory::maps::impostor::published::{
     BY_PROXIES, Figures, PROXY_RADII, Published, REFRACTED, SEEN_SHARES, name, searches,
 };
@@ -80,6 +79,16 @@ rows! {
         published: Option<f64> = "published time over the classical look-up's",
     }
 }
+rows! {
+    /// A shape in place of the room.
+    struct Proxied = "Texels of look-ups by shapes" by [sphere, map, way] {
+        sphere: String = "sphere",
+        map: String = "map",
+        way: String = "look-up",
+        rays: u64 = "rays",
+        same: f64 = "rays whose texel is the one in their direction (%)",
+    }
+}
 /// What was found.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Found {
@@ -90,6 +99,8 @@ pub struct Found {
     #[serde(default)]
     texels: Vec<Texels>,
     beside: Vec<Beside>,
+    #[serde(default)]
+    proxied: Vec<Proxied>,
 }
 
 const CRITERIA: &[Criterion<Row>] = &[
@@ -137,6 +148,13 @@ const OF_TIMES: &[Criterion<Time>] = &[
     .among(|row| row.way != name(&ImpostorSettings::of(SearchMethod::Classical, 0), 1))
     .because("a fifth more pictures a second was published"),
 ];
+
+const OF_PROXIED: &[Criterion<Proxied>] = &[Criterion::each(
+    "shapes are looked up where they say: rays whose texel is the one in their direction (%)",
+    Bound::AtLeast(99.9),
+    |row: &Proxied| row.same.into(),
+)
+.because("on the border of two texels rounding chooses")];
 
 const BOX: &str = "box in place of the room";
 /// How the names of spheres in its place begin.
@@ -301,49 +319,71 @@ fn timed(
     Ok(ways.iter().enumerate().map(row).collect())
 }
 
-/// What needs no distances: shapes in place of the room, several maps, refraction of the classical look-up.
-fn without_distances(side: u32) -> Result<Vec<Row>> {
-    let mut rows = Vec::new();
+/// What needs no distances, looked up on the device: shapes in place of the room, and several maps.
+fn without_distances(gpu: &Gpu, map: Parametrization, side: u32, texels: f64) -> Result<(Vec<Row>, Vec<Proxied>)> {
+    let (mut rows, mut proxied) = (Vec::new(), Vec::new());
+    let size = map.size_for(texels);
+    // Texels tell their number.
+    let image = MapImage::from_fn(map, size, |texel| {
+        DVec3::X * f64::from((texel.layer * size.y + texel.y) * size.x + texel.x)
+    })?;
+    let at_middle = ProxyMaps::new(gpu, &[(DVec3::ZERO, image.clone())])?;
     for (sphere, spheres) in BY_PROXIES {
         let rays = sphere.rays(side, None);
-        let mut add = |way: String, published: Figures, of: &dyn Fn(DVec3, DVec3) -> DVec3| {
-            let directions: Vec<DVec3> = rays.iter().map(|ray| of(ray.origin, ray.direction)).collect();
-            rows.push(row(&sphere, "none".into(), way, &rays, &directions).beside(&published));
+        let mut add = |way: String, published: Figures, shape: ProxyShape| -> Result<()> {
+            let hits = at_middle.look_up(&rays, &shape, false)?;
+            let directions: Vec<DVec3> = hits.iter().map(|hit| hit.direction).collect();
+            let is_same = |hit: &&ProxyHit| {
+                let texel = image.nearest(hit.direction);
+                texel.is_some_and(|texel| texel.as_dvec3() == hit.radiance)
+            };
+            proxied.push(Proxied {
+                sphere: sphere.name.into(),
+                map: map.to_string(),
+                way: way.clone(),
+                rays: rays.len() as u64,
+                same: 100.0 * hits.iter().filter(is_same).count() as f64 / rays.len().max(1) as f64,
+            });
+            rows.push(row(&sphere, map.to_string(), way, &rays, &directions).beside(&published));
+            Ok(())
         };
-        add(BOX.into(), Figures::NONE, &|x, r| {
-            x + box_proxy(x, r, DVec3::NEG_ONE, DVec3::ONE) * r
-        });
+        let of_box = ProxyShape::Box {
+            low: DVec3::NEG_ONE,
+            high: DVec3::ONE,
+        };
+        add(BOX.into(), Figures::NONE, of_box)?;
         for (radius, published) in PROXY_RADII.into_iter().zip(spheres) {
-            let of = |x: DVec3, r: DVec3| x + sphere_proxy(x, r, radius) * r;
-            add(
-                format!("{SPHERE} {radius} in place of the room"),
-                Figures::of_mean(published),
-                &of,
-            );
+            let way = format!("{SPHERE} {radius} in place of the room");
+            add(way, Figures::of_mean(published), ProxyShape::Sphere { radius })?;
         }
-        let hemisphere = "hemisphere of radius 1.2 above the ground";
-        add(hemisphere.into(), Figures::NONE, &|x, r| {
-            x + hemisphere_proxy(x, DVec3::Y, 1.2) * r
-        });
+        let hemisphere = ProxyShape::Hemisphere {
+            up: DVec3::Y,
+            radius: 1.2,
+        };
+        add(
+            "hemisphere of radius 1.2 above the ground".into(),
+            Figures::NONE,
+            hemisphere,
+        )?;
     }
-    // Directions from each map's own place, brought back to the origin as what they meet.
-    let places = [DVec3::ZERO, DVec3::new(0.5, 0.0, 0.0)];
+    // Each map shows what rays from its own place meet, as the direction of that from the middle.
     let sphere = ShinySphere::B;
     let rays = sphere.rays(side, None);
-    for (way, is_blended) in [("nearest of two maps", false), ("blend of the two nearest maps", true)] {
-        let mut directions = Vec::new();
-        for ray in &rays {
-            let blend = blended_maps(&places, ray.origin)?;
-            let met = blend.maps.map(|map| {
-                let place = places[map as usize];
-                (place + sphere.room.hit(place, ray.direction) * ray.direction).normalize()
-            });
-            let weight = if is_blended { blend.weight } else { 0.0 };
-            directions.push(met[0].lerp(met[1], weight));
-        }
-        rows.push(row(&sphere, "none".into(), way.into(), &rays, &directions));
+    let mut maps = Vec::new();
+    for place in [DVec3::ZERO, DVec3::new(0.5, 0.0, 0.0)] {
+        let image = MapImage::from_fn(map, size, |texel| {
+            let direction = map.texel_direction(size, texel).unwrap_or(DVec3::Z);
+            (place + sphere.room.hit(place, direction) * direction).normalize()
+        })?;
+        maps.push((place, image));
     }
-    Ok(rows)
+    let maps = ProxyMaps::new(gpu, &maps)?;
+    for (way, blends) in [("nearest of two maps", false), ("blend of the two nearest maps", true)] {
+        let hits = maps.look_up(&rays, &ProxyShape::None, blends)?;
+        let directions: Vec<DVec3> = hits.iter().map(|hit| hit.radiance).collect();
+        rows.push(row(&sphere, map.to_string(), way.into(), &rays, &directions));
+    }
+    Ok((rows, proxied))
 }
 
 /// Refracted rays of a glass sphere.
@@ -409,7 +449,12 @@ impl Study for Found {
             searched(context, &gpu, *map, sphere, side, texels)
         })?;
         mirrored_rooms::draw(context, context.pick(PICTURED, 8), texels)?;
-        rows.extend(without_distances(side)?);
+        let mut proxied = Vec::new();
+        for map in context.first(&maps, 1) {
+            let (of_map, texels_of_map) = without_distances(&gpu, *map, side, texels)?;
+            rows.extend(of_map);
+            proxied.extend(texels_of_map);
+        }
         rows.extend(refracted(&gpu, side, texels)?);
         // Pictures a second: 642, 447 and 323 in an empty room; 630, 430, 323 and 108 beside a box.
         let times = |map| -> Result<Vec<Time>> {
@@ -438,6 +483,7 @@ impl Study for Found {
                 search_times::by_texels(context, &gpu, *map, texels)
             })?,
             beside: search_times::beside_rays(context, &gpu, timed_maps, texels)?,
+            proxied,
         })
     }
 
@@ -452,14 +498,19 @@ impl Study for Found {
                  nearest, with the texel's plane. Published means are those of exact distances. The published march takes the first crossing of the surface's distance, be it a \
                  jump at a silhouette; the engine's goes on to the next one that is a surface, which is farther from the truth at P1 and nearer to it at P2, \
                  and which several layers need. Times are those of the search alone; of the classical look-up, which searches for nothing, of a kernel \
-                 that copies directions.",
+                 that copies directions. Shapes in place of the room and several maps are looked up on the device as well; of two maps, at the middle and at (0.5, 0, 0), errors are those of what \
+                 their nearest texels show, as it is seen from the middle.",
             )
             .and(Findings::of(&self.seen, OF_SEEN))
             .and(Findings::of(&self.times, OF_TIMES))
             .note(
                 "Each look-up ends with one fetch of radiance, so that the classical one is that fetch alone. Nearest texels without planes. Published times are those of whole pictures \
                  on a graphics processor of 2004, with all that they have besides; of which of the brackets is not said. One step looks up \
-                 two distances before the radiance, three fetches for the classical one's, and what a ray's reading and writing take is shared.",
+                 two distances before the radiance, three fetches for the classical one's, and what a ray's reading and writing take is shared. Both layouts look up the same, texel by texel, so that a buffer \
+                 of its own saves no fetch: what it takes more does not grow with the steps, and without a search, where both fetch the radiance alone, it is nothing. That leaves the radiance behind a search: \
+                 beside it, a distance's fetch reads the whole texel, sixteen bytes, and the last steps of a search go about the texel whose radiance comes next, which is in the processor's nearest \
+                 cache by then; in a buffer of its own the radiance is met there for the first time. What the split saves on a graphics processor is the bandwidth of its small texture cache, and this \
+                 processor's caches hold a map of 6 MiB whole.",
             )
             .and(Findings::of(&self.steps, search_times::OF_STEPS))
             .note(
@@ -473,9 +524,11 @@ impl Study for Found {
             .and(Findings::of(&self.beside, search_times::OF_BESIDE))
             .note(
                 "Rays of a mirror sphere of one metre about the map's place, in turns by the search and by the index that scenes have by default. The map has one layer with planes, found by rays; errors \
-                 are angles at its place against closest hits, and rays whose hit it does not see are among them. The hybrid of three steps looks up seven distances, each with a direction \
-                 that is encoded and a texel's plane; a closest hit meets few nodes here.",
-            );
+                 are angles at its place against closest hits, and rays whose hit it does not see are among them. The hybrid of three steps looks up six distances, and a seventh where the map's \
+                 place does not see the ray's point, each with a direction that is encoded and a texel's plane; a closest hit meets few nodes here.",
+            )
+            .and(Findings::of(&self.proxied, OF_PROXIED))
+            .note("Texels tell their number, and the direction is that of the device.");
         if self.look_ups.is_empty() {
             return findings;
         }

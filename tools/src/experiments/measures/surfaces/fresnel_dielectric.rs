@@ -100,7 +100,7 @@ const OF_ERRORS: &[Criterion<Row>] = &[
 ];
 const OF_POINTS: &[Criterion<Point>] = &[Criterion::each(
     "published values are reproduced: their difference",
-    Bound::AtMost(5.1e-5),
+    Bound::AtMost(5e-5),
     |point: &Point| (point.value - point.published.unwrap_or(f64::NAN)).abs().into(),
 )
 .among(|point| point.published.is_some())

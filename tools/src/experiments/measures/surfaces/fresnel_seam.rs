@@ -1,11 +1,12 @@
 //! A sphere of aluminium, exact above and approximate below: the step between the halves, and how much of the sphere is lit.
 //!
-//! Oracle: the exact factor, and the steps that were published. Far light and viewer have one half vector, so that all that reflects is met at one angle.
+//! In double precision, and by the device in the forms that scenes have, from numbers that the host prepares. Oracle: the exact factor, and the steps that were published. Far light and viewer have one half vector, so that all that reflects is met at one angle.
 
 use std::f64::consts::PI;
 
 use clerestory::Result;
-use clerestory::scene::{FresnelForm, metals};
+use clerestory::scene::{ConductorIor, FresnelForm, metals};
+use clerestory::transport::fresnel::curve::{CurveForm, FresnelCurve};
 use clerestory::transport::fresnel::form::MetalFresnel;
 use glam::DVec3;
 
@@ -46,6 +47,8 @@ rows! {
         published: f64 = "published step",
         share: f64 = "step of the rescaled curve (%)",
         left: f64 = "step of the compensated curve",
+        on_device: f64 = "step of the rescaled curve on the device",
+        left_on_device: f64 = "step of the compensated curve on the device",
         lit: f64 = "lit pixels of a sphere 256 pixels wide",
     }
 }
@@ -66,6 +69,18 @@ const CRITERIA: &[Criterion<Row>] = &[
     )
     .because("a fiftieth of white, which the eye finds at an edge in good light alone")
     .in_every_form(),
+    Criterion::each(
+        "on the device steps of the rescaled curve are the published ones: their difference",
+        Bound::AtMost(1e-3),
+        |row: &Row| (row.on_device - row.published).abs().into(),
+    )
+    .in_every_form(),
+    Criterion::each(
+        "on the device the compensated curve leaves no seam: its step",
+        Bound::AtMost(0.02),
+        |row: &Row| row.left_on_device.abs().into(),
+    )
+    .in_every_form(),
 ];
 
 impl Study for Found {
@@ -77,9 +92,29 @@ impl Study for Found {
         let part = |quantity: usize| DVec3::from_array(indices.map(|index| index[quantity]));
         let [exact, rescaled, compensated] = [FresnelForm::Exact, FresnelForm::Rescaled, FresnelForm::Compensated]
             .map(|form| MetalFresnel::new(form, part(0), part(1)));
+        let gpu = (context.gpu)()?;
+        let ior = ConductorIor {
+            eta: part(0).as_vec3(),
+            k: part(1).as_vec3(),
+        };
+        let at_angles = PUBLISHED.map(|(angle, _)| angle.to_radians().cos());
+        let on_device = |form: CurveForm| -> Result<Vec<DVec3>> {
+            let values = FresnelCurve::new(&gpu, form, &ior, 1)?.run_at(&gpu, &at_angles)?;
+            Ok(values
+                .into_iter()
+                .map(|value| DVec3::from_array(value.map(f64::from)))
+                .collect())
+        };
+        let [device_exact, device_rescaled, device_compensated] = [
+            on_device(CurveForm::Exact)?,
+            on_device(CurveForm::RescaledF0)?,
+            on_device(CurveForm::CompensatedF0)?,
+        ];
         let mut rows = Vec::new();
-        for (angle, published) in PUBLISHED {
-            let c = angle.to_radians().cos();
+        for (i, (angle, published)) in PUBLISHED.into_iter().enumerate() {
+            let c = at_angles[i];
+            let device_step = device_rescaled[i] - device_exact[i];
+            let device_left = device_compensated[i] - device_exact[i];
             let [at, step, left] = [
                 exact.at(c),
                 rescaled.at(c) - exact.at(c),
@@ -94,6 +129,8 @@ impl Study for Found {
                     published: published[band],
                     share: 100.0 * step[band] / at[band],
                     left: left[band],
+                    on_device: device_step[band],
+                    left_on_device: device_left[band],
                     // The part of the disc that light from twice the angle reaches.
                     lit: 128.0 * 128.0 * PI * 0.5 * (1.0 + (2.0 * angle).to_radians().cos()),
                 });
