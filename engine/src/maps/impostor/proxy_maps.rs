@@ -16,7 +16,7 @@ use crate::gpu::ash::vk;
 use crate::gpu::shaders::constants::{PROXY_BOX, PROXY_HEMISPHERE, PROXY_NONE, PROXY_SPHERE};
 use crate::gpu::shaders::maps::proxy_look_up as kernel;
 use crate::gpu::shaders::types::ProxyHit as DeviceHit;
-use crate::gpu::{Buffer, BufferDesc, Category, Gpu, TexelView};
+use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, TexelView};
 use crate::maps::{MapImage, Parametrization, is_unit};
 use crate::{Error, Result};
 
@@ -156,7 +156,7 @@ impl ProxyMaps {
             return Ok(Vec::new());
         }
         let gpu = &self.gpu;
-        let pipeline = gpu.compute_pipeline(&kernel::Spec {
+        let pipeline: ComputePipeline<kernel::Kernel> = gpu.compute_pipeline(&kernel::Spec {
             directional_kind: self.kind,
             directional_border: 0,
             proxy_shape: shape.number(),
