@@ -230,6 +230,16 @@ fn mistakes_in_an_experiment_are_named() -> Tested {
 }
 
 #[test]
+fn a_black_reference_is_refused() -> Tested {
+    let bench = Bench::new()?;
+    let output = bench.run(&TEXT.replace("size =", "path_set = \"LVE\"\nsize ="), &[])?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && said.contains("the picture is black"), "{said}");
+    assert_eq!(bench.references()?, 0);
+    Ok(())
+}
+
+#[test]
 fn scenes_for_a_measure_with_its_own_are_refused() -> Tested {
     let experiment =
         "title = \"tiny\"\nabout = \"What a test looks at.\"\nsystems = [\"BG-2\"]\nmeasure = \"phase-functions\"\n";

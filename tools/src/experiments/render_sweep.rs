@@ -237,6 +237,13 @@ impl Running<'_> {
         let Some(rendered) = self.render(stage, &options)? else {
             return Ok(None);
         };
+        if rendered.picture.main_layer()?.values().iter().all(|&value| value == 0.0) {
+            return Err(Error::setting(
+                "reference",
+                &what,
+                "the picture is black, so that no error relative to it exists: take more samples or a brighter scene",
+            ));
+        }
         let picture = reference::keep(&path, &key, &rendered)?;
         Ok(Some((path, key, picture)))
     }

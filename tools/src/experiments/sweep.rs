@@ -69,6 +69,8 @@ const SMOKE_REFERENCE_SPP: u32 = 1024;
 const DEFAULT_REPEATS: u32 = 5;
 /// The sampler whose samples are independent.
 const INDEPENDENT: &str = "pcg";
+/// The setting by which samples of a pixel share vertices of light subpaths.
+const SAMPLES_AT_ONCE: &str = "samples_at_once";
 
 /// What a sweep renders.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -314,6 +316,13 @@ impl Sweep {
                  reference's variance, and too much would be subtracted from every error; wanted is \"pcg\"",
             ));
         }
+        if let Some(samples) = reference.get(SAMPLES_AT_ONCE).filter(|samples| **samples != 1) {
+            return Err(wrong(
+                "reference.settings.samples_at_once",
+                samples,
+                "lets samples of a pixel share vertices, whose noise the variance layer lacks: too little would be subtracted from every error; wanted is 1",
+            ));
+        }
         Ok(())
     }
 
@@ -354,8 +363,8 @@ impl Sweep {
         Ok(Value::Object(settings))
     }
 
-    /// All settings of the reference. Where its technique has a choice of samplers and the file makes none, samples are independent: only
-    /// then is the variance layer, which counts samples, the variance of the mean.
+    /// All settings of the reference. Where its technique has a choice of samplers and the file makes none, samples are independent, and where
+    /// samples of a pixel may share vertices they do not: only then is the variance layer, which counts samples, the variance of the mean.
     ///
     /// # Errors
     /// As [`Sweep::settings`].
@@ -366,6 +375,9 @@ impl Sweep {
             given
                 .entry("sampler")
                 .or_insert_with(|| Value::String(INDEPENDENT.into()));
+        }
+        if info.settings.has(SAMPLES_AT_ONCE) {
+            given.entry(SAMPLES_AT_ONCE).or_insert_with(|| 1.into());
         }
         self.settings(&self.reference.technique, &given)
     }
@@ -401,6 +413,8 @@ mod tests {
         );
         assert_eq!(settings(0)["path_set"], "all");
         assert_eq!(sweep.reference_settings().unwrap()["sampler"], "pcg");
+        let joined = changed("spp = 1024", "spp = 1024, technique = \"bdpt\"").unwrap();
+        assert_eq!(joined.reference_settings().unwrap()["samples_at_once"], 1);
     }
 
     #[test]
@@ -425,6 +439,11 @@ mod tests {
                 "spp = 1024",
                 "spp = 1024, settings = { sampler = \"sobol\" }",
                 "overestimate the reference's variance",
+            ),
+            (
+                "spp = 1024",
+                "spp = 1024, technique = \"bdpt\", settings = { samples_at_once = 8 }",
+                "the variance layer lacks",
             ),
         ] {
             let message = changed(from, to).unwrap_err();

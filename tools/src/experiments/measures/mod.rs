@@ -155,6 +155,7 @@ measures! {
     on_device "map-quality" photon_maps::map_quality;
     on_device "map-rendering" maps::map_rendering;
     on_host "merge-example" photon_maps::merge_example;
+    on_device "metal-agreement" rendering::metal_agreement;
     on_device "metal-looks" surfaces::metal_looks;
     on_device "metal-spectra" surfaces::metal_spectra;
     on_host "microfacet-parts" surfaces::microfacet_parts;

@@ -15,7 +15,7 @@ use clerestory::{Result, scene};
 use super::cases::mapper;
 use super::scenarios::{Depths, SCENARIOS, Scenario, TWO_BOUNCES, by_name};
 use crate::agreement::spread;
-use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Study, change, geometric_mean, rows};
+use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::maps::sphere::sheet;
 use crate::experiments::measures::pictures::{finished, mean_of, mean_picture};
@@ -25,8 +25,9 @@ const SMOKE_SIZE: [u32; 2] = [16, 12];
 /// Photons of counts, where the source has as many, and of pictures.
 const PHOTONS: [u32; 2] = [1 << 18, 1 << 16];
 const SMOKE_PHOTONS: [u32; 2] = [1 << 12, 1 << 10];
-/// Pictures of either kernel, each of a pass.
-const PICTURES: u32 = 4;
+/// Pictures of either kernel, each of a pass: an even number, of which the first half tells where it is bright and the second how bright.
+const PICTURES: u32 = 16;
+const SMOKE_PICTURES: u32 = 4;
 /// Scenes of a smoke run.
 const SMOKE_SCENES: [&str; 2] = ["ring, point light", "atrium, neutral"];
 /// Kernels this close to the greatest radius have been clamped to it, relatively.
@@ -67,9 +68,9 @@ rows! {
         variance_neighbors: Measured = "relative variance by neighbours",
         variance_footprints: Measured = "relative variance by footprints",
         variance: Measured = "variance by footprints over that by neighbours",
-        bright_neighbors: f64 = "brightest hundredth over mean, by neighbours",
-        bright_footprints: f64 = "brightest hundredth over mean, by footprints",
-        brighter: f64 = "brightest hundredth, by footprints over by neighbours",
+        bright_neighbors: Repeats = "brightest hundredth over mean, by neighbours",
+        bright_footprints: Repeats = "brightest hundredth over mean, by footprints",
+        brighter: Repeats = "brightest hundredth, by footprints over by neighbours",
     }
 }
 
@@ -102,8 +103,9 @@ const OF_PAIRS: &[Criterion<Pair>] = &[
     Criterion::each(
         "the ring's caustic is sharper by footprints: brightest hundredth over mean, over that by neighbours",
         Bound::AtLeast(1.0),
-        |row: &Pair| row.brighter.into(),
+        |row: &Pair| (&row.brighter).into(),
     )
+    .because("what is bright is told by other pictures of both kinds, so that noise does not make it brighter")
     .among(|row| row.has_mirror),
     Criterion::each(
         "elsewhere footprints have less variance: over that by neighbours",
@@ -146,7 +148,8 @@ impl Study for Found {
             )
             .and(Findings::of(&self.pairs, OF_PAIRS))
             .note(format!(
-                "Light of the medium that was scattered once or twice, by {PICTURES} passes of {} photons each, whose spread is the variance; {} × {} pixels.",
+                "Light of the medium that was scattered once or twice, by {PICTURES} passes of {} photons each, whose spread is the variance; {} × {} pixels. The brightest hundredth is that of the first half of these passes by both kernels, and measured in the \
+                 second.",
                 PHOTONS[1], SIZE[0], SIZE[1],
             ));
         if self.pairs.is_empty() {
@@ -225,7 +228,7 @@ fn pictures(
     };
     let mut mapper = mapper(gpu, scene, context.pick(SIZE, SMOKE_SIZE), settings)?;
     let mut pictures = Vec::new();
-    for seed in 0..PICTURES {
+    for seed in 0..context.pick(PICTURES, SMOKE_PICTURES) {
         mapper.restart(seed)?;
         pictures.push(finished(&mut mapper, 1)?);
     }
@@ -255,9 +258,12 @@ fn pair(context: &Context<'_>, gpu: &Gpu, scene: &Scene, scenario: &Scenario) ->
         shown.push(png::tone_mapped(picture.main_layer()?, picture.width(), &tone));
     }
     let [neighbors, footprints] = [0, 1].map(|kernel| spread::measure(&values[kernel], &common));
+    let half = values[0].len() / 2;
+    let first_half = values.iter().flat_map(|of_kernel| &of_kernel[..half]);
+    let bright = brightest(&mean_picture(first_half.map(Vec::as_slice)));
     let [bright_neighbors, bright_footprints] = [0, 1].map(|kernel| {
-        let mean = mean_picture(values[kernel].iter().map(Vec::as_slice));
-        brightest(&mean) / mean_of(&mean)
+        let over_mean = |picture: &Vec<f32>| mean_at(picture, &bright) / mean_of(picture);
+        values[kernel][half..].iter().map(over_mean).collect::<Repeats>()
     });
     let (Some(neighbors), Some(footprints)) = (neighbors, footprints) else {
         return Ok((None, shown));
@@ -274,19 +280,25 @@ fn pair(context: &Context<'_>, gpu: &Gpu, scene: &Scene, scenario: &Scenario) ->
             ratio,
             MARGIN * ratio * relative(&footprints).hypot(relative(&neighbors)),
         ),
+        brighter: bright_footprints.over(&bright_neighbors),
         bright_neighbors,
         bright_footprints,
-        brighter: bright_footprints / bright_neighbors,
     };
     Ok((Some(pair), shown))
 }
 
-/// The mean of the brightest values.
-fn brightest(values: &[f32]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(|a, b| b.total_cmp(a));
-    let count = (BRIGHT * sorted.len() as f64).ceil() as usize;
-    mean_of(&sorted[..count])
+/// Where the brightest values are.
+fn brightest(values: &[f32]) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..values.len()).collect();
+    places.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+    places.truncate((BRIGHT * values.len() as f64).ceil() as usize);
+    places
+}
+
+/// The mean of the values at some places.
+fn mean_at(values: &[f32], places: &[usize]) -> f64 {
+    let sum: f64 = places.iter().map(|&place| f64::from(values[place])).sum();
+    sum / places.len() as f64
 }
 
 #[cfg(test)]
@@ -297,7 +309,9 @@ mod tests {
     fn the_brightest_hundredth_is_told() {
         // 200 values: the two greatest are 199 and 198.
         let values: Vec<f32> = (0..200u8).map(f32::from).collect();
-        assert_eq!(brightest(&values), 198.5);
-        assert_eq!(brightest(&[2.0]), 2.0);
+        let places = brightest(&values);
+        assert_eq!(places, [199, 198]);
+        assert_eq!(mean_at(&values, &places), 198.5);
+        assert_eq!(brightest(&[2.0]), [0]);
     }
 }

@@ -27,7 +27,7 @@ const SCENES: [&str; 4] = [
 /// Light that was scattered twice or more, the last time in a medium.
 const PATHS: &str = "L.+VE";
 /// Pixels a side, and samples a pixel of references.
-const FULL: (u32, u32) = (32, 8192);
+const FULL: (u32, u32) = (32, 32768);
 const SMOKE: (u32, u32) = (8, 64);
 /// Photons of a pass.
 const PHOTONS: u32 = 1 << 14;
@@ -42,7 +42,7 @@ const SMOKE_ESTIMATES: usize = 2;
 const SECONDS: f64 = 1.5;
 const SMOKE_SPP: u32 = 2;
 /// Pictures by each estimate.
-const TURNS: usize = 5;
+const TURNS: usize = 9;
 /// Within this factor of the least error a choice counts as the best.
 const FACTOR: f64 = 1.5;
 

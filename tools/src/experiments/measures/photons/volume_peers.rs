@@ -1,7 +1,7 @@
 //! Photons in media beside Mitsuba's volumetric path tracers: time to equal error where a small lamp throws a caustic into fog, in turns.
 //!
-//! Mitsuba runs in a process of its own through `tools/mitsuba/reference.py`, with the Python that has it; where there is none, a table says so. Our errors are about a reference by the path
-//! tracer, whose variance is subtracted, so that photons' bias counts; Mitsuba's are those of the spread between its pictures, which have none. Its time to our error takes the error to fall with
+//! Mitsuba runs in a process of its own through `tools/mitsuba/reference.py`, with the Python that has it; where there is none, a table says so. Our errors are about a reference by
+//! bidirectional paths, whose variance is subtracted, so that photons' bias counts; Mitsuba's are those of the spread between its pictures, which have none. Its time to our error takes the error to fall with
 //! one over time, as that of independent samples does. Scenes have no interpolated normals, so that both renderers hold the same.
 
 use std::path::Path;
@@ -45,7 +45,7 @@ const OURS: [(&str, &str); 2] = [("beam estimate", "ray"), ("photon beams", "bea
 /// Mitsuba's integrators.
 const THEIRS: [&str; 2] = ["volpath", "volpathmis"];
 /// Samples a pixel of a picture of Mitsuba's.
-const SAMPLES: u32 = 256;
+const SAMPLES: u32 = 1024;
 /// Each contender's turns, and Mitsuba's pictures in each.
 const TURNS: usize = 5;
 const PICTURES: u32 = 2;
@@ -84,11 +84,11 @@ rows! {
 }
 rows! {
     /// The mean of a contender's pictures.
-    struct Mean = "Means, over the path tracer's" by [scene, contender] {
+    struct Mean = "Means, over those of bidirectional paths" by [scene, contender] {
         scene: String = "scene",
         contender: String = "contender",
         is_ours: bool = "ours",
-        mean: Measured = "mean over that of the path tracer's reference",
+        mean: Measured = "mean over that of the reference",
     }
 }
 rows! {
@@ -115,7 +115,7 @@ const OF_BEST: &[Criterion<Best>] = &[Criterion::each(
 )
 .needs("Mitsuba")];
 const OF_MEANS: &[Criterion<Mean>] = &[Criterion::each(
-    "means of photons are the path tracer's within 1 %: ratio",
+    "means of photons are those of bidirectional paths within 1 %: ratio",
     Bound::Between(1.0 - ALLOWED, 1.0 + ALLOWED),
     |row: &Mean| row.mean,
 )
@@ -222,7 +222,7 @@ impl Study for Found {
             .and(Findings::of(&self.rows, &[]))
             .note(format!(
                 "{0} × {0} pixels; {TURNS} turns, of a picture of {SECONDS} s by photons with default settings, with the preparation of the technique, and of {PICTURES} pictures of {SAMPLES} independent samples \
-                 a pixel by Mitsuba, without it. Ours are held against {1} samples a pixel of the path tracer; what Mitsuba's error would be after our time is that of one over time.",
+                 a pixel by Mitsuba, without it. Ours are held against {1} samples a pixel of bidirectional paths; what Mitsuba's error would be after our time is that of one over time.",
                 FULL.0, FULL.1,
             ))
             .and(Findings::of(&self.means, OF_MEANS))
@@ -267,11 +267,11 @@ fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> R
     let exported = mitsuba::export(&scene, "", [side; 2], &folder);
     let renderer = Renderer::new(gpu, &scene)?;
     let of_reference = RenderOptions {
-        technique: Some("path".into()),
+        technique: Some("bdpt".into()),
         size: [side; 2],
         spp,
         seed: SEED,
-        settings: json!({ "sampler": "pcg" }).into(),
+        settings: json!({ "sampler": "pcg", "samples_at_once": 1 }).into(),
         ..RenderOptions::default()
     };
     let Some(rendered) = render(&renderer, &of_reference, context.watch)? else {

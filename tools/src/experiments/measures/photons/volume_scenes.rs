@@ -28,7 +28,7 @@ const PATHS: &str = "L(V|[DGV]V|V.)E";
 /// Light that was scattered in a medium, however often: what is seen of a body behind its surface.
 const OF_BODIES: &str = "L.*V.*E";
 /// Pixels, and samples a pixel of references, and of each picture of a smoke run.
-const FULL: ([u32; 2], u32) = ([32, 24], 4096);
+const FULL: ([u32; 2], u32) = ([32, 24], 16384);
 const SMOKE: ([u32; 2], u32) = ([8, 6], 16);
 const SMOKE_SPP: u32 = 2;
 /// Seconds of a picture.
@@ -110,11 +110,18 @@ const OF_MEDIA: &[Criterion<MediumRow>] = &[
     )
     .in_every_form(),
 ];
-const OF_LIGHT: &[Criterion<Light>] = &[Criterion::each(
-    "means agree within 1 % or three standard errors: difference over that",
-    Bound::AtMost(1.0),
-    |row: &Light| row.over_allowed.into(),
-)];
+const OF_LIGHT: &[Criterion<Light>] = &[
+    Criterion::each(
+        "means agree within 1 % or three standard errors: difference over that",
+        Bound::AtMost(1.0),
+        |row: &Light| row.over_allowed.into(),
+    ),
+    Criterion::each(
+        "means are known well enough: three standard errors of both together (%)",
+        Bound::AtMost(100.0 * ALLOWED),
+        |row: &Light| (DEVIATIONS * row.path_error.hypot(row.photon_error)).into(),
+    ),
+];
 
 fn published<T>(scene: &str, of: fn(&PublishedMedium) -> T) -> Option<T> {
     by_name(scene).map(|scenario| of(&scenario.medium))

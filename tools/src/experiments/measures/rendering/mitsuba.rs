@@ -27,7 +27,7 @@ const MITSUBA: &str = "Mitsuba";
 
 rows! {
     /// A scene by both renderers.
-    struct Agreement = "Agreement within noise" by [scene] {
+    pub(super) struct Agreement = "Agreement within noise" by [scene] {
         scene: String = "scene",
         shows: String = "what it tests",
         verdict: Option<String> = "verdict",
@@ -84,7 +84,7 @@ pub struct Found {
     timed: Vec<String>,
 }
 
-const OF_AGREEMENT: &[Criterion<Agreement>] = &[
+pub(super) const OF_AGREEMENT: &[Criterion<Agreement>] = &[
     Criterion::each(
         "no scene differs, by values or by blocks; ½ where heavy tails leave it undecided",
         Bound::AtLeast(0.5),
@@ -311,24 +311,33 @@ impl Agreement {
     }
 }
 
+/// How scenes were compared, in a sentence.
+pub(super) fn comparison(report: &AgreementReport) -> String {
+    let options = &report.options;
+    format!(
+        "{0} × {0} pixels, {1} samples per pixel on both sides, {2}. Every value is tested at a significance of {SIGNIFICANCE} for the whole \
+         picture. A rejected 8 × 8 block or |bias z| above {BIAS_Z_MAX} calls for another look.",
+        options.size,
+        options.passes * options.samples_per_pass,
+        report.machine.mitsuba,
+    )
+}
+
+/// The rows of all scenes, those that were not compared last.
+pub(super) fn agreements(report: &AgreementReport) -> Vec<Agreement> {
+    let rows = report.scenes.iter().map(Agreement::of);
+    rows.chain(report.uncompared.iter().map(Agreement::not_compared))
+        .collect()
+}
+
 impl Found {
     fn of(report: &AgreementReport) -> Self {
         let options = &report.options;
-        let compared = format!(
-            "{0} × {0} pixels, {1} samples per pixel on both sides, {2}. Every value is tested at a significance of {SIGNIFICANCE} for the whole \
-             picture. A rejected 8 × 8 block or |bias z| above {BIAS_Z_MAX} calls for another look.",
-            options.size,
-            options.passes * options.samples_per_pass,
-            report.machine.mitsuba,
-        );
         let raced = report.scenes.iter().filter(|_| options.timing_rounds > 0);
-        let rows = report.scenes.iter().map(Agreement::of);
         Self {
             cause: None,
-            agreement: rows
-                .chain(report.uncompared.iter().map(Agreement::not_compared))
-                .collect(),
-            compared: vec![compared],
+            agreement: agreements(report),
+            compared: vec![comparison(report)],
             times: raced.map(|scene| Time::of(scene, options)).collect(),
             timed: [report.race_method()]
                 .into_iter()
@@ -342,7 +351,10 @@ impl Study for Found {
     fn measure(context: &Context<'_>) -> Result<Self> {
         let options = options(context);
         match mitsuba_version(&options.python) {
-            Err(cause) => without_mitsuba(cause, std::env::var_os(PYTHON_VARIABLE).is_some()),
+            Err(cause) => Ok(Self {
+                cause: Some(without_mitsuba(cause)?),
+                ..Self::default()
+            }),
             Ok(version) => {
                 context.watch.note(&format!("Mitsuba {version}"));
                 let report = compared(context, &options)?;
@@ -436,18 +448,19 @@ fn options(context: &Context<'_>) -> AgreementOptions {
     }
 }
 
-/// What follows from a Python without Mitsuba: an error where somebody named that Python.
-fn without_mitsuba(cause: Error, is_named: bool) -> Result<Found> {
-    if is_named {
-        return Err(cause);
-    }
-    Ok(Found {
-        cause: Some(cause.to_string()),
-        ..Found::default()
-    })
+/// What a page says of a Python without Mitsuba.
+///
+/// # Errors
+/// That cause where somebody named the Python.
+pub(super) fn without_mitsuba(cause: Error) -> Result<String> {
+    said_of(cause, std::env::var_os(PYTHON_VARIABLE).is_some())
 }
 
-fn not_measured(cause: &str) -> Table {
+fn said_of(cause: Error, is_named: bool) -> Result<String> {
+    if is_named { Err(cause) } else { Ok(cause.to_string()) }
+}
+
+pub(super) fn not_measured(cause: &str) -> Table {
     let mut table = Table::new("Agreement with Mitsuba 3", &["result"]);
     table.row([format!("not measured: {cause}").into()]);
     table.note(INSTALL);
@@ -483,8 +496,12 @@ mod tests {
     #[test]
     fn a_named_python_without_mitsuba_is_an_error() {
         let cause = || Error::setting("python", "python3", "did not run Mitsuba 3");
-        assert!(without_mitsuba(cause(), true).is_err());
-        let found = without_mitsuba(cause(), false).unwrap().findings();
+        assert!(said_of(cause(), true).is_err());
+        let found = Found {
+            cause: Some(said_of(cause(), false).unwrap()),
+            ..Found::default()
+        };
+        let found = found.findings();
         assert_eq!(found.tables.len(), 1);
         assert!(
             found

@@ -8,6 +8,7 @@ pub mod cycles;
 pub mod fog_peers;
 pub mod light_choice;
 pub mod many_lamps;
+pub mod metal_agreement;
 pub mod mitsuba;
 pub mod path_sets;
 pub mod path_stages;
