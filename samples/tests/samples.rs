@@ -601,6 +601,17 @@ fn the_same_frames_of_photons_in_media_are_the_same_picture() {
     assert!(again() == again());
 }
 
+#[test]
+fn the_camera_among_photons_in_media_flies() {
+    let [before, after] = ["0", "0.05"].map(|flight| volume_photons(&["--volume", "ray", "--flight", flight]).0);
+    // In three frames it has come 15 cm nearer to the green wall, which ends at three quarters of the picture then: behind it the box is over, and there is nothing.
+    let [lit, dark] = [&before, &after].map(|picture| mean(picture, [0.8, 1.0], [0.2, 0.8])[1]);
+    assert!(lit > 5.0 && dark < 0.2 * lit, "{lit} {dark}");
+    // The rest shows the box.
+    let [was, is] = [&before, &after].map(|picture| mean(picture, [0.1, 0.6], [0.2, 0.8])[0]);
+    assert!(is > 0.5 * was && was > 5.0, "{was} {is}");
+}
+
 /// The last frame of a window of photons in media, and what was said.
 fn volume_photons_shown(arguments: &[&str]) -> (image::RgbImage, String) {
     let folder = tempfile::tempdir().unwrap();

@@ -89,6 +89,23 @@ const OF_MATERIALS: [&str; 5] = [
     "black-and-white",
 ];
 
+fn is_of_materials(case: &HardCase) -> bool {
+    OF_MATERIALS.contains(&case.name)
+}
+
+/// Cases whose media are a ball that scatters, most of a picture.
+const BALLS_OF_MEDIA: [&str; 3] = ["media-narrow-phase", "media-albedo-one", "media-uneven-bands"];
+const GRIDS_AND_SHEETS: [&str; 2] = ["media-grids", "media-thin-sheet"];
+
+fn is_ball_of_a_medium(case: &HardCase) -> bool {
+    BALLS_OF_MEDIA.contains(&case.name)
+}
+
+/// Whether a case has neither media nor materials that take long.
+fn is_another(case: &HardCase) -> bool {
+    !is_of_materials(case) && !case.of_media
+}
+
 #[test]
 fn the_path_tracer_takes_the_cases_as_documented() {
     check_alone("path (sobol)");
@@ -100,23 +117,48 @@ fn the_path_tracer_takes_the_cases_with_independent_samples() {
 }
 
 #[test]
-fn photon_mapping_takes_the_cases_as_documented() {
-    check_alone("photon");
+fn photon_mapping_takes_the_cases_of_materials_as_documented() {
+    check_some_alone("photon", is_of_materials);
 }
 
 #[test]
-fn photon_beams_take_the_cases_of_media_as_documented() {
-    check_alone("photon (beams)");
+fn photon_mapping_takes_the_cases_of_media_as_documented() {
+    check_some_alone("photon", |case| case.of_media);
 }
 
 #[test]
-fn photon_planes_take_the_cases_of_media_as_documented() {
-    check_alone("photon (planes)");
+fn photon_mapping_takes_the_other_cases_as_documented() {
+    check_some_alone("photon", is_another);
 }
 
 #[test]
-fn photon_points_and_beams_together_take_the_cases_of_media_as_documented() {
-    check_alone("photon (unified)");
+fn photon_beams_take_balls_of_media_as_documented() {
+    check_some_alone("photon (beams)", is_ball_of_a_medium);
+}
+
+#[test]
+fn photon_beams_take_the_other_cases_of_media_as_documented() {
+    check_some_alone("photon (beams)", |case| !is_ball_of_a_medium(case));
+}
+
+#[test]
+fn photon_planes_take_balls_of_media_as_documented() {
+    check_some_alone("photon (planes)", is_ball_of_a_medium);
+}
+
+#[test]
+fn photon_planes_take_the_other_cases_of_media_as_documented() {
+    check_some_alone("photon (planes)", |case| !is_ball_of_a_medium(case));
+}
+
+#[test]
+fn photon_points_and_beams_together_take_balls_of_media_as_documented() {
+    check_some_alone("photon (unified)", is_ball_of_a_medium);
+}
+
+#[test]
+fn photon_points_and_beams_together_take_the_other_cases_of_media_as_documented() {
+    check_some_alone("photon (unified)", |case| !is_ball_of_a_medium(case));
 }
 
 #[test]
@@ -126,22 +168,45 @@ fn marches_take_the_cases_of_media_as_documented() {
 
 #[test]
 fn virtual_lights_take_the_cases_of_materials_as_documented() {
-    check_some_alone("vpl", |case| OF_MATERIALS.contains(&case.name));
+    check_some_alone("vpl", is_of_materials);
 }
 
 #[test]
 fn virtual_lights_take_the_other_cases_as_documented() {
-    check_some_alone("vpl", |case| !OF_MATERIALS.contains(&case.name) && !case.of_media);
+    check_some_alone("vpl", is_another);
+}
+
+/// The balls of media one by one, and the other media in two parts.
+#[test]
+fn virtual_lights_take_narrow_phase_functions_as_documented() {
+    check_some_alone("vpl", |case| case.name == BALLS_OF_MEDIA[0]);
 }
 
 #[test]
-fn virtual_lights_take_the_cases_of_media_as_documented() {
-    check_some_alone("vpl", |case| case.of_media);
+fn virtual_lights_take_media_that_absorb_nothing_as_documented() {
+    check_some_alone("vpl", |case| case.name == BALLS_OF_MEDIA[1]);
+}
+
+#[test]
+fn virtual_lights_take_media_of_uneven_bands_as_documented() {
+    check_some_alone("vpl", |case| case.name == BALLS_OF_MEDIA[2]);
+}
+
+#[test]
+fn virtual_lights_take_grids_and_sheets_as_documented() {
+    check_some_alone("vpl", |case| GRIDS_AND_SHEETS.contains(&case.name));
+}
+
+#[test]
+fn virtual_lights_take_the_other_cases_of_media_as_documented() {
+    check_some_alone("vpl", |case| {
+        case.of_media && !is_ball_of_a_medium(case) && !GRIDS_AND_SHEETS.contains(&case.name)
+    });
 }
 
 #[test]
 fn bidirectional_paths_take_the_cases_of_materials_as_documented() {
-    check_some_alone("bdpt", |case| OF_MATERIALS.contains(&case.name));
+    check_some_alone("bdpt", is_of_materials);
 }
 
 #[test]
@@ -155,8 +220,13 @@ fn bidirectional_paths_take_the_cases_of_media_as_documented() {
 }
 
 #[test]
-fn frames_of_many_lights_take_the_cases_as_documented() {
-    check_alone("many-light");
+fn frames_of_many_lights_take_the_cases_of_materials_as_documented() {
+    check_some_alone("many-light", is_of_materials);
+}
+
+#[test]
+fn frames_of_many_lights_take_the_other_cases_as_documented() {
+    check_some_alone("many-light", |case| !is_of_materials(case));
 }
 
 #[test]

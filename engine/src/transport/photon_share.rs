@@ -17,8 +17,11 @@
 //! a light sample is that stands for as many photons, and by nothing that a narrow phase function has at xₖ. Nor is x₁ taken to scatter evenly there: where it lies in a medium d² stands over 4 π times the
 //! density with which light is scattered ([`evened_distance2`]), of planes and of the beams beside them.
 //!
-//! Sources: J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014, whose weights take whole densities; E. Veach, "Robust Monte Carlo Methods for
-//! Light Transport Simulation", 1997, 9.2.2. Units: m, m⁻¹, m². Scaling lengths changes no share. Twin of `transport/photon_share.glsl`.
+//! Weights of whole densities, with a term for each way to join the subpaths, are carried from vertex to vertex recursively by N. Moonen and A. Jalba. Here eye paths that go on
+//! and photons that are seen where eye paths first scatter are all the ways there are to find a path, between which the inner factors cancel: the closed form above has what is left at both ends, and there is nothing to carry.
+//!
+//! Sources: J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014, whose weights take whole densities; N. Moonen and A. Jalba, "Efficient Hardware
+//! Acceleration of Robust Volumetric Light Transport Simulation", CGF 42(6), 2023, for recursive weights; E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 9.2.2. Units: m, m⁻¹, m². Scaling lengths changes no share. Twin of `transport/photon_share.glsl`.
 
 use glam::DVec3;
 use std::f64::consts::PI;

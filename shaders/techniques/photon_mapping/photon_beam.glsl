@@ -284,8 +284,8 @@ bool ask_beam(uint slot, uint place, WalkState path) {
     }
     if (!LINEAR || push.first == 0u) {
         atomicAdd(beam_counters.queries, 1u);
-        if (COUNT_FETCHES && status.rounds > 0u) {
-            atomicAdd(beam_counters.later_queries, 1u);
+        if (COUNT_FETCHES) {
+            atomicAdd(beam_counters.queries_by_bounce[min(status.rounds, BEAM_BOUNCES - 1u)], 1u);
         }
     }
     COUNT_WIDE(beam_counters.events, gathered_events)

@@ -17,6 +17,9 @@
 
 layout(constant_id = 60) const bool TABULATES = false;  // the transmittance along rays through grids, instead of walks
 
+// Bounces of a path whose queries are counted by themselves, the last one with all that come after it.
+const uint BEAM_BOUNCES = 4u;
+
 // Beside the media, so that set 1 is free for the ray index (photon_beam_fused.comp).
 // descriptor set 3 from binding 8: PhotonBeamSet
 
@@ -26,7 +29,7 @@ layout(set = 3, binding = 11, scalar) restrict buffer BeamCounters {
     uint queries;
     uint events[2];   // kernels that a ray pierced: 64 bits, the low word first
     // Where COUNT_FETCHES says so, also:
-    uint later_queries;  // of rays after the first one of a path
+    uint queries_by_bounce[BEAM_BOUNCES];  // of the first ray of a path, the second one, and so on
     uint nodes[2];    // of the tree, fetched once for all rays that go through it together
     uint records[2];  // likewise
     uint tests[2];    // pairs of nodes, and records, that each ray has gone through

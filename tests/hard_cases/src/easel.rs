@@ -12,6 +12,8 @@ use clerestory::transport::GpuScene;
 use clerestory::{Error, Result};
 use serde_json::Value;
 
+use crate::scenes::SMALL;
+
 /// Seed of all pictures.
 const SEED: u32 = 7;
 /// What the mean over a picture may be wrong by, relatively, where photons light it, times the square root of their number: five standard deviations of
@@ -24,6 +26,9 @@ pub(crate) const OTHER_TOLERANCE: f64 = 0.05;
 pub(crate) const PASSES: u32 = 12;
 /// Samples that a pass may have.
 const PASS_SAMPLES_MAX: u32 = 4096;
+
+/// Size of pictures of media of such techniques.
+const FEW: [u32; 2] = [8, 8];
 
 /// Samples of a picture at most, of techniques with a bias whose every sample is a frame with lights of its own for all pixels: noise is far below their tolerance then.
 const FRAMES_MAX: u32 = 96;
@@ -112,6 +117,19 @@ impl<'a> Easel<'a> {
             other.settings.insert(setting.into(), value.into());
         }
         other
+    }
+
+    /// A setting that differs from the technique's default, where it is a word.
+    pub fn word(&self, setting: &str) -> Option<&str> {
+        self.settings.get(setting).and_then(Value::as_str)
+    }
+
+    /// Size of pictures of media whose means alone are judged: of a few pixels where all share the noise of a pass, and each would ask all of its lights.
+    ///
+    /// # Errors
+    /// Those of settings that cannot be read.
+    pub fn size_in_media(&self) -> Result<[u32; 2]> {
+        Ok(if self.pass_samples()?.is_some() { FEW } else { SMALL })
     }
 
     /// For scenes whose paths lose half of their light at each bounce: without the rare bright samples of early Russian roulette the

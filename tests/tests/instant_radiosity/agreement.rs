@@ -37,50 +37,55 @@ fn unbounded_lights_agree_with_the_path_tracer_in_a_sphere() {
     });
 }
 
-#[test]
-fn compensated_bounds_agree_with_the_path_tracer() {
+/// A bound of a kind, and walks of a pass.
+type Walked = (Bound, f32, u32);
+
+/// Fails unless a scene with each of these bounds has the path tracer's light.
+fn expect_agreement(scene: &Scene, bounds: &[Walked]) {
     with_gpu(|gpu| {
-        let mut sphere = builtin("builtin:sphere-light?rho=0.5&frequency=12");
-        sphere.lights.clear();
-        add_point(&mut sphere, Vec3::new(0.3, -0.2, 0.1), Vec3::ONE);
-        // Three decades about the bounds that would be chosen, and of looser ones more walks, each of whose lights is less of a spike. Distances in the room, too, where
-        // edges of all lengths and angles meet.
-        type Walked = (Bound, f32, u32);
-        let cases: [(_, &[Walked]); 2] = [
-            (
-                room(),
-                &[
-                    (Bound::Geometry, 0.03, 4),
-                    (Bound::Geometry, 1.0, 4),
-                    (Bound::Geometry, 30.0, 16),
-                    (Bound::Distance, 1.0, 4),
-                    (Bound::Distance, 0.03, 16),
-                ],
-            ),
-            (
-                sphere,
-                &[
-                    (Bound::Distance, 4.0, 4),
-                    (Bound::Distance, 0.1, 4),
-                    (Bound::Distance, 0.004, 4),
-                ],
-            ),
-        ];
-        for (scene, bounds) in cases {
-            let reference = traced(gpu, &scene, 2048);
-            for &(bound, bound_value, walks) in bounds {
-                let settings = VirtualLightSettings {
-                    walks,
-                    bound,
-                    bound_value,
-                    ..several()
-                };
-                let found = passes(gpu, &scene, &settings, 48);
-                let what = format!("{}, {bound:?} {bound_value}", scene.name);
-                found.expect_same_as(&what, &reference, 0.0);
-            }
+        let reference = traced(gpu, scene, 2048);
+        for &(bound, bound_value, walks) in bounds {
+            let settings = VirtualLightSettings {
+                walks,
+                bound,
+                bound_value,
+                ..several()
+            };
+            let found = passes(gpu, scene, &settings, 48);
+            let what = format!("{}, {bound:?} {bound_value}", scene.name);
+            found.expect_same_as(&what, &reference, 0.0);
         }
     });
+}
+
+/// Three decades about the bounds that would be chosen, and of looser ones more walks, each of whose lights is less of a spike.
+#[test]
+fn compensated_bounds_agree_with_the_path_tracer() {
+    let bounds = [
+        (Bound::Geometry, 0.03, 4),
+        (Bound::Geometry, 1.0, 4),
+        (Bound::Geometry, 30.0, 16),
+    ];
+    expect_agreement(&room(), &bounds);
+}
+
+/// Where edges of all lengths and angles meet.
+#[test]
+fn compensated_distances_agree_with_the_path_tracer_in_a_room() {
+    expect_agreement(&room(), &[(Bound::Distance, 1.0, 4), (Bound::Distance, 0.03, 16)]);
+}
+
+#[test]
+fn compensated_distances_agree_with_the_path_tracer_in_a_sphere() {
+    let mut sphere = builtin("builtin:sphere-light?rho=0.5&frequency=12");
+    sphere.lights.clear();
+    add_point(&mut sphere, Vec3::new(0.3, -0.2, 0.1), Vec3::ONE);
+    let bounds = [
+        (Bound::Distance, 4.0, 4),
+        (Bound::Distance, 0.1, 4),
+        (Bound::Distance, 0.004, 4),
+    ];
+    expect_agreement(&sphere, &bounds);
 }
 
 /// A rough conductor with interpolated normals, mirrors, coats, and panes that are there in part or let light through.

@@ -90,29 +90,53 @@ fn several() -> VirtualLightSettings {
     }
 }
 
-/// Isotropic and forward, in all of space and in a body, with the bound that is chosen by default.
-#[test]
-fn lights_at_collisions_agree_with_the_path_tracer() {
+/// Size of pictures that are compared: all pixels share the noise of a pass, whatever their number, and each asks all of its lights.
+const FEW: [u32; 2] = [8; 2];
+/// Passes, whose spread says how far their mean may be off.
+const PASSES: u32 = 40;
+
+fn few_pixels(gpu: &Gpu, scene: &Scene, settings: &VirtualLightSettings) -> Passes {
+    passes_of_size(gpu, scene, FEW, settings, PASSES)
+}
+
+/// The path tracer's picture of the same light paths.
+fn expected(gpu: &Gpu, scene: &Scene) -> Rendered {
+    render(gpu, scene, FEW, 2048, &paths(PATHS))
+}
+
+/// Fails unless a scene has the path tracer's light, with the bound that is chosen by default.
+fn expect_agreement(scene: &Scene) {
     with_gpu(|gpu| {
-        let forward = Phase::HenyeyGreenstein { g: 0.6 };
-        for scene in [fog_room(Phase::Isotropic), fog_room(forward), fog_body(forward)] {
-            let found = passes(gpu, &scene, &several(), 48);
-            found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
-            assert!(found.counts.walks.events > 0, "{:?}", found.counts);
-        }
+        let found = few_pixels(gpu, scene, &several());
+        found.expect_same_as(&scene.name, &expected(gpu, scene), 0.0);
+        assert!(found.counts.walks.events > 0, "{:?}", found.counts);
     });
 }
 
-/// Delta tracking to collisions and ratio tracking between them, alone and beside a homogeneous medium.
+#[test]
+fn lights_at_collisions_agree_with_the_path_tracer() {
+    expect_agreement(&fog_room(Phase::Isotropic));
+}
+
+#[test]
+fn lights_at_forward_collisions_agree_with_the_path_tracer() {
+    expect_agreement(&fog_room(Phase::HenyeyGreenstein { g: 0.6 }));
+}
+
+#[test]
+fn lights_in_a_body_agree_with_the_path_tracer() {
+    expect_agreement(&fog_body(Phase::HenyeyGreenstein { g: 0.6 }));
+}
+
+/// Delta tracking to collisions and ratio tracking between them.
 #[test]
 fn lights_in_grids_agree_with_the_path_tracer() {
-    with_gpu(|gpu| {
-        for scene in [cloud(false), cloud(true)] {
-            let found = passes(gpu, &scene, &several(), 48);
-            found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
-            assert!(found.counts.walks.events > 0, "{:?}", found.counts);
-        }
-    });
+    expect_agreement(&cloud(false));
+}
+
+#[test]
+fn lights_in_grids_beside_a_homogeneous_medium_agree_with_the_path_tracer() {
+    expect_agreement(&cloud(true));
 }
 
 /// Walks start in a medium that emits, where nothing else does.
@@ -123,28 +147,47 @@ fn media_that_emit_send_walks() {
         scene.name = "glowing body".into();
         scene.lights.clear();
         scene.media[0].emission = Vec3::new(3.0, 2.0, 1.0);
-        let found = passes(gpu, &scene, &several(), 48);
-        found.expect_same_as(&scene.name, &traced(gpu, &scene, 2048), 0.0);
+        let found = few_pixels(gpu, &scene, &several());
+        found.expect_same_as(&scene.name, &expected(gpu, &scene), 0.0);
         assert!(found.counts.lights > 0, "{:?}", found.counts);
     });
 }
 
-/// Bounds of both kinds about those that would be chosen, and a loose one, which leaves nothing to compensate.
+/// Fails unless a bound about those that would be chosen is made up for.
+fn expect_compensated(bound: Bound, bound_value: f32) {
+    with_gpu(|gpu| {
+        let scene = fog_room(Phase::Isotropic);
+        let settings = VirtualLightSettings {
+            bound,
+            bound_value,
+            ..several()
+        };
+        let found = few_pixels(gpu, &scene, &settings);
+        found.expect_same_as(&format!("{bound:?} {bound_value}"), &expected(gpu, &scene), 0.0);
+    });
+}
+
 #[test]
 fn bounds_in_media_are_compensated() {
+    expect_compensated(Bound::Geometry, 1.0);
+}
+
+#[test]
+fn tight_bounds_in_media_are_compensated() {
+    expect_compensated(Bound::Geometry, 0.1);
+}
+
+#[test]
+fn distances_in_media_are_compensated() {
+    expect_compensated(Bound::Distance, 1.0);
+}
+
+/// They leave nothing to compensate.
+#[test]
+fn loose_bounds_in_media_compensate_nothing() {
     const LOOSE: f32 = 1e30;
     with_gpu(|gpu| {
         let scene = fog_room(Phase::Isotropic);
-        let reference = traced(gpu, &scene, 2048);
-        for (bound, bound_value) in [(Bound::Geometry, 0.1), (Bound::Geometry, 1.0), (Bound::Distance, 1.0)] {
-            let settings = VirtualLightSettings {
-                bound,
-                bound_value,
-                ..several()
-            };
-            let found = passes(gpu, &scene, &settings, 48);
-            found.expect_same_as(&format!("{bound:?} {bound_value}"), &reference, 0.0);
-        }
         let of = |bound| {
             let settings = VirtualLightSettings {
                 bound,
@@ -177,7 +220,7 @@ fn furnaces_with_fog_are_even() {
             ..Medium::default()
         });
         scene.surrounding = Some(0);
-        let found = passes(gpu, &scene, &several(), 48);
+        let found = few_pixels(gpu, &scene, &several());
         for means in &found.means {
             expect_mean_of("radiance", means, 2.0, 0.0, 0.0);
         }
@@ -185,19 +228,29 @@ fn furnaces_with_fog_are_even() {
 }
 
 /// A glass ball in fog behind a boundary, lit by a lamp: no virtual light has what the glass sends into the fog.
+fn glass_in_fog() -> Scene {
+    builtin("builtin:fog-box?sphere=glass&sigma_s=3")
+}
+
 #[test]
 fn light_off_mirrors_into_media_is_the_eye_paths() {
     with_gpu(|gpu| {
-        let scene = builtin("builtin:fog-box?sphere=glass&sigma_s=3");
-        let reference = traced(gpu, &scene, 1024);
-        passes(gpu, &scene, &several(), 48).expect_same_as("compensated", &reference, 0.0);
+        let scene = glass_in_fog();
+        few_pixels(gpu, &scene, &several()).expect_same_as("compensated", &expected(gpu, &scene), 0.0);
+    });
+}
+
+#[test]
+fn light_off_mirrors_into_media_is_the_eye_paths_without_a_bound() {
+    with_gpu(|gpu| {
+        let scene = glass_in_fog();
         let unbounded = VirtualLightSettings {
             walks: 32,
             bound: Bound::None,
             ..several()
         };
-        // Without a bound single lights count without one, so that a few passes are not normal: means alone, with room for that.
-        passes(gpu, &scene, &unbounded, 48).expect_same_as("unbounded", &reference, 0.05);
+        // Single lights count without a bound, so that a few passes are not normal: means alone, with room for that.
+        few_pixels(gpu, &scene, &unbounded).expect_same_as("unbounded", &expected(gpu, &scene), 0.05);
     });
 }
 
@@ -250,33 +303,41 @@ fn bits(picture: &[Vec<f32>; 2]) -> Vec<u32> {
     picture.iter().flatten().map(|value| value.to_bits()).collect()
 }
 
-#[test]
-fn pictures_of_media_do_not_depend_on_how_work_is_shared_out() {
+/// Fails unless pictures of a scene have the same bits and counts however lights and submissions are parted.
+fn expect_same_however_it_is_shared_out(scene: &Scene) {
     with_gpu(|gpu| {
-        for scene in [fog_body(Phase::Isotropic), cloud(true)] {
-            let base = VirtualLightSettings {
-                walks: 20,
-                ..settings()
+        let base = VirtualLightSettings {
+            walks: 20,
+            ..settings()
+        };
+        let of = |settings: &VirtualLightSettings| {
+            let mut renderer = renderer(gpu, scene, [13, 7], settings);
+            (bits(&advance(&mut renderer, 2)), renderer.counts())
+        };
+        let (whole, counts) = of(&base);
+        assert!(counts.gather.shadow_rays > 0);
+        for (lights_at_once, submission_work) in [(1, 0), (3, 0), (0, 1), (2, 64)] {
+            let settings = VirtualLightSettings {
+                lights_at_once,
+                submission_work,
+                ..base.clone()
             };
-            let of = |settings: &VirtualLightSettings| {
-                let mut renderer = renderer(gpu, &scene, [13, 7], settings);
-                (bits(&advance(&mut renderer, 3)), renderer.counts())
-            };
-            let (whole, counts) = of(&base);
-            assert!(counts.gather.shadow_rays > 0);
-            for (lights_at_once, submission_work) in [(1, 0), (3, 0), (0, 1), (2, 64)] {
-                let settings = VirtualLightSettings {
-                    lights_at_once,
-                    submission_work,
-                    ..base.clone()
-                };
-                let (parted, parted_counts) = of(&settings);
-                let what = format!("{}: {lights_at_once} {submission_work}", scene.name);
-                assert_eq!(parted, whole, "{what}");
-                assert_eq!(parted_counts, counts, "{what}");
-            }
+            let (parted, parted_counts) = of(&settings);
+            let what = format!("{}: {lights_at_once} {submission_work}", scene.name);
+            assert_eq!(parted, whole, "{what}");
+            assert_eq!(parted_counts, counts, "{what}");
         }
     });
+}
+
+#[test]
+fn pictures_of_media_do_not_depend_on_how_work_is_shared_out() {
+    expect_same_however_it_is_shared_out(&fog_body(Phase::Isotropic));
+}
+
+#[test]
+fn pictures_of_grids_do_not_depend_on_how_work_is_shared_out() {
+    expect_same_however_it_is_shared_out(&cloud(true));
 }
 
 /// Walks that stop in most stretches: were there more in a dispatch than a software driver runs, it would leave out light.

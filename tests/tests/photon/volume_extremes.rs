@@ -69,6 +69,21 @@ fn collisions_and_beams_together_stay_finite() {
     expect_finite(VolumeEstimate::Unified);
 }
 
+/// What opens a picture of a room, radians.
+const FIELD_OF_VIEW: f32 = 1.4;
+
+/// A room with walls of radiance 1 that reflect nothing, in fog that loses nothing, seen from its middle.
+fn room(sigma: f32, half: f64, g: f32) -> Scene {
+    let mut room = builtin("builtin:furnace-box?rho=0&emission=1");
+    transform(&mut room, DAffine3::from_scale(DVec3::splat(half)));
+    room.media = vec![medium(sigma, 1.0, Phase::HenyeyGreenstein { g })];
+    room.surrounding = Some(0);
+    // Rays into many directions, since photons of one are seen in few.
+    let target = DVec3::new(0.3, 0.2, -1.0) * half;
+    room.cameras = vec![Camera::look_at("main", DVec3::ZERO, target, DVec3::Y, FIELD_OF_VIEW)];
+    room
+}
+
 /// Extinctions, 1/m, and half the side of a room, m, with a radius of kernels that is a free path at most: from a thousandth of a free path to ten.
 const ROOMS: [(f32, f64, f32); 3] = [(1e-3, 1.0, 0.1), (1.0, 1.0, 0.1), (1e3, 5e-3, 1e-3)];
 
@@ -82,13 +97,7 @@ fn expect_even_beside(volume: VolumeEstimate, volume_paths: bool) {
     with_gpu(|gpu| {
         for (sigma, half, volume_radius) in ROOMS {
             for g in NARROW {
-                let mut room = builtin("builtin:furnace-box?rho=0&emission=1");
-                transform(&mut room, DAffine3::from_scale(DVec3::splat(half)));
-                room.media = vec![medium(sigma, 1.0, Phase::HenyeyGreenstein { g })];
-                room.surrounding = Some(0);
-                // Rays into many directions, since photons of one are seen in few.
-                let target = DVec3::new(0.3, 0.2, -1.0) * half;
-                room.cameras = vec![Camera::look_at("main", DVec3::ZERO, target, DVec3::Y, 1.4)];
+                let room = room(sigma, half, g);
                 let settings = PhotonSettings {
                     volume,
                     volume_paths,
@@ -137,6 +146,76 @@ fn furnaces_are_even_by_planes_and_eye_paths() {
 #[test]
 fn furnaces_are_even_by_collisions_and_beams_together() {
     expect_even(VolumeEstimate::Unified);
+}
+
+/// Mean radiance over a picture of [`room`] of light that is scattered twice at last: what comes to the first of both places has radiance 1 from everywhere, so that along a ray
+/// L = ∫ σ exp(−σ t) ∫ p(ω) (1 − exp(−σ l(t, ω))) dω dt, with l as far as the wall. By points of a lattice that is even in all five dimensions.
+fn scattered_twice(room: &Scene, sigma: f64, half: f64, g: f64) -> f64 {
+    const POINTS: u32 = 1 << 18;
+    // The real root of x⁶ = x + 1, whose powers are as far from fractions as five numbers can be.
+    const ROOT: f64 = 1.134_724_138_401_519_5;
+    let to_wall = |from: DVec3, way: DVec3| {
+        let along = |axis: usize| (half * way[axis].signum() - from[axis]) / way[axis];
+        along(0).min(along(1)).min(along(2))
+    };
+    let camera = room.cameras[0].transform.matrix3;
+    let slope = (0.5 * f64::from(FIELD_OF_VIEW)).tan();
+    let of_point = |point: u32| {
+        let u: [f64; 5] = std::array::from_fn(|k| (0.5 + f64::from(point) * ROOT.powi(-(k as i32 + 1))).fract());
+        let way = (camera * DVec3::new((2.0 * u[0] - 1.0) * slope, (2.0 * u[1] - 1.0) * slope, -1.0)).normalize();
+        // Where light is scattered for the last time: as often as it is along the ray.
+        let collides = -(-sigma * to_wall(DVec3::ZERO, way)).exp_m1();
+        let at = way * (-(-u[2] * collides).ln_1p() / sigma);
+        // From where it comes there, by the law of Henyey and Greenstein.
+        let share = (1.0 - g * g) / (1.0 - g + 2.0 * g * u[3]);
+        let cosine = ((1.0 + g * g - share * share) / (2.0 * g)).clamp(-1.0, 1.0);
+        let (x, y) = way.any_orthonormal_pair();
+        let (sin, cos) = (2.0 * PI * u[4]).sin_cos();
+        let aside = (1.0 - cosine * cosine).sqrt();
+        let from = way * cosine + (x * cos + y * sin) * aside;
+        collides * -(-sigma * to_wall(at, from)).exp_m1()
+    };
+    (0..POINTS).map(of_point).sum::<f64>() / f64::from(POINTS)
+}
+
+/// Fails unless planes, and eye paths that go on, have the light that rooms of an extinction scatter twice at last, exactly. `most`: standard error, of the light itself.
+fn expect_scattered_twice((sigma, half, volume_radius): (f32, f64, f32), photons: u32, passes: u32, most: f64) {
+    with_gpu(|gpu| {
+        for g in NARROW {
+            let room = room(sigma, half, g);
+            let settings = PhotonSettings {
+                volume: VolumeEstimate::Planes,
+                volume_paths: true,
+                // All ways have planes.
+                volume_radius,
+                photons,
+                ..settings("L.*VVE")
+            };
+            let expected = scattered_twice(&room, f64::from(sigma), half, f64::from(g));
+            let what = format!("{sigma} per metre, g {g}");
+            let found = means(gpu, &room, &settings, passes);
+            found.expect(&what, 0, 0, exactly(expected), 0.0);
+            let error = found.parts[0][0].variance.sqrt() / expected;
+            assert!(error < most, "{what}: ± {error:.3} of the light");
+        }
+    });
+}
+
+/// Where a ray has a thousandth of a free path eye paths find next to nothing, and planes have nearly all of the light by few that lie along a ray: one standard error is about a tenth of it. The path tracer
+/// would need some hundred thousand paths for one that counts.
+#[test]
+fn planes_have_what_thin_rooms_scatter_twice() {
+    expect_scattered_twice(ROOMS[0], 1 << 13, 32, 0.25);
+}
+
+#[test]
+fn planes_have_what_rooms_scatter_twice() {
+    expect_scattered_twice(ROOMS[1], 1 << 11, 24, 0.1);
+}
+
+#[test]
+fn planes_have_what_dense_rooms_scatter_twice() {
+    expect_scattered_twice(ROOMS[2], 1 << 10, 24, 0.1);
 }
 
 #[test]

@@ -69,7 +69,10 @@ fn expect_alike(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, forms: &[Fo
         let what = format!("{}: {form:?}", scene.name);
         assert!(all[0].bits == other.bits, "{what}: another picture");
         assert_eq!((all[0].beams, all[0].gather), (other.beams, other.gather), "{what}");
-        assert_eq!(all[0].fetches.later_queries, other.fetches.later_queries, "{what}");
+        assert_eq!(
+            all[0].fetches.queries_by_bounce, other.fetches.queries_by_bounce,
+            "{what}"
+        );
         if form.1 == MapQuery::Single {
             // Whichever invocations they have, rays go the same ways through the map.
             assert_eq!(all[0].fetches, other.fetches, "{what}");
@@ -123,7 +126,9 @@ fn every_queue_and_packets_give_the_same_picture_through_media() {
         );
         assert!(first.beams.photons > first.beams.queries && first.stalls == 0);
         // Rays come into a box behind their first bounce.
-        assert_eq!(first.fetches.later_queries, first.beams.queries);
+        let [of_first_rays, behind_one, ..] = first.fetches.queries_by_bounce;
+        assert!(of_first_rays == 0 && behind_one > 0, "{first:?}");
+        assert_eq!(first.fetches.later_queries(), first.beams.queries);
         for (form, made) in FORMS.iter().zip(&all) {
             let fetches = made.fetches;
             let fetched = fetches.nodes / 2 + fetches.records;
@@ -173,7 +178,7 @@ fn queues_and_packets_take_rays_that_all_meet_the_same_thousand_kernels() {
         let all = expect_alike(gpu, &scene, &asked(160, 50.0), &FORMS);
         let first = &all[0];
         assert_eq!(first.beams.queries, PLACES);
-        assert_eq!(first.fetches.later_queries, 0);
+        assert_eq!(first.fetches.queries_by_bounce, [PLACES, 0, 0, 0]);
         let each = first.beams.photons / PLACES;
         println!("{each} kernels about each ray, {:?}", first.fetches);
         assert!(

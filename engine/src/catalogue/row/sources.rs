@@ -58,6 +58,7 @@ sources! {
     GEORGIEV_2012 = "georgiev-2012": "I. Georgiev", "Implementing Vertex Connection and Merging", "Technical report, Saarland University", 2012;
     GERASIMOV_2004 = "gerasimov-2004": "P. Gerasimov", "Omnidirectional Shadow Mapping", "GPU Gems", 2004;
     GORAL_1984 = "goral-1984": "C. Goral, K. Torrance, D. Greenberg, B. Battaile", "Modeling the Interaction of Light Between Diffuse Surfaces", "SIGGRAPH", 1984;
+    GPUUPBP = "gpuupbp": "N. Moonen", "GPUUPBP, an OptiX-based GPU Implementation of Unified Points, Beams and Paths", "github.com/nolmoonen/gpuupbp", 2023;
     GREENE_1986 = "greene-1986": "N. Greene", "Environment Mapping and Other Applications of World Projections", "IEEE CG&A 6(11)", 1986;
     GULBRANDSEN_2014 = "gulbrandsen-2014": "O. Gulbrandsen", "Artist Friendly Metallic Fresnel", "JCGT 3(4)", 2014;
     HACHISUKA_JENSEN_2009 = "hachisuka-jensen-2009": "T. Hachisuka, H. W. Jensen", "Stochastic Progressive Photon Mapping", "ACM TOG 28(5)", 2009;
@@ -131,6 +132,7 @@ sources! {
     MILLER_2019 = "miller-2019": "B. Miller, I. Georgiev, W. Jarosz", "A Null-scattering Path Integral Formulation of Light Transport", "SIGGRAPH", 2019;
     MILLER_HOFFMAN_1984 = "miller-hoffman-1984": "G. Miller, C. R. Hoffman", "Illumination and Reflection Maps", "SIGGRAPH course notes", 1984;
     MOLLER_TRUMBORE_1997 = "moller-trumbore-1997": "T. Möller, B. Trumbore", "Fast, Minimum Storage Ray/Triangle Intersection", "JGT 2(1)", 1997;
+    MOONEN_JALBA_2023 = "moonen-jalba-2023": "N. Moonen, A. Jalba", "Efficient Hardware Acceleration of Robust Volumetric Light Transport Simulation", "CGF 42(6)", 2023;
     NEYMAN_1934 = "neyman-1934": "J. Neyman", "On the Two Different Aspects of the Representative Method", "Journal of the Royal Statistical Society 97(4)", 1934;
     NOVAK_2010 = "novak-2010": "J. Novák, V. Havran, C. Dachsbacher", "Path Regeneration for Interactive Path Tracing", "Eurographics short papers", 2010;
     NOVAK_2014 = "novak-2014": "J. Novák, A. Selle, W. Jarosz", "Residual Ratio Tracking for Estimating Attenuation in Participating Media", "SIGGRAPH Asia", 2014;

@@ -467,6 +467,8 @@ pub(crate) const ROWS: &[Row] = &[
             "tests/tests/instant_radiosity/bounds.rs::steps_of_compensation_leave_a_geometric_series",
             "tests/tests/instant_radiosity/bounds.rs::loose_bounds_compensate_nothing_and_tight_ones_trace_paths",
             "tests/tests/instant_radiosity/agreement.rs::compensated_bounds_agree_with_the_path_tracer",
+            "tests/tests/instant_radiosity/agreement.rs::compensated_distances_agree_with_the_path_tracer_in_a_room",
+            "tests/tests/instant_radiosity/agreement.rs::compensated_distances_agree_with_the_path_tracer_in_a_sphere",
         ],
         settings: &["compensation", "compensation_steps"],
         ..Row::of(file!())

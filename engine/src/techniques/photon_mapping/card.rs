@@ -217,7 +217,7 @@ impl Technique for PhotonMapper {
         }
         if PhotonMapper::settings(self).count_fetches {
             all.extend([
-                ("later_beam_queries", c.ray_fetches.later_queries),
+                ("later_beam_queries", c.ray_fetches.later_queries()),
                 ("map_nodes_fetched", c.ray_fetches.nodes),
                 ("events_fetched", c.ray_fetches.records),
                 ("ray_tests", c.ray_fetches.tests),

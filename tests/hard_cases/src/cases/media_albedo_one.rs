@@ -55,7 +55,7 @@ pub(super) fn ball(sigma: f32, phase: Phase) -> Result<Scene> {
 fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut judgement = Judgement::default();
     for sigma in [1e-4, 1.0, 30.0] {
-        let painted = easel.paint_in_passes(&ball(sigma, Phase::Isotropic)?, SMALL, 64)?;
+        let painted = easel.paint_in_passes(&ball(sigma, Phase::Isotropic)?, easel.size_in_media()?, 64)?;
         let documented = if easel.has_bias() { AT_BOUNDARIES } else { 0.0 };
         judgement.mean_documented(
             &format!("optical radius {sigma:e}"),

@@ -77,7 +77,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let mut furnace = nested(&[scatters.clone(), Medium::default(), scatters]);
     furnace.environment = Some(Environment::uniform(Vec3::ONE));
     furnace.cameras = vec![camera_down(0.4, 2.0)];
-    let painted = easel.paint_in_passes(&furnace, SMALL, 64)?;
+    let painted = easel.paint_in_passes(&furnace, easel.size_in_media()?, 64)?;
     let documented = if easel.has_bias() { AT_HOLES } else { 0.0 };
     judgement.mean_documented("scatters in a furnace", &painted, [1.0; 3], [0.0, documented])?;
     Ok(judgement)

@@ -4,7 +4,6 @@ use clerestory::Result;
 use clerestory::scene::Phase;
 
 use super::media_albedo_one::ball;
-use crate::scenes::SMALL;
 use crate::{Easel, HardCase, Judgement};
 
 pub(super) const CASE: HardCase = HardCase {
@@ -35,7 +34,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
             ("Henyey–Greenstein", Phase::HenyeyGreenstein { g }),
             ("Schlick", Phase::Schlick { k: g }),
         ] {
-            let painted = easel.paint_in_passes(&ball(10.0, phase)?, SMALL, 32)?;
+            let painted = easel.paint_in_passes(&ball(10.0, phase)?, easel.size_in_media()?, 32)?;
             let documented = if easel.has_bias() || easel.shares_noise()? {
                 LACKING
             } else {

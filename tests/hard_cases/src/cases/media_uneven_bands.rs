@@ -53,7 +53,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
         judgement.mean(&format!("absorbs {sigma:e} per metre"), &painted, expected, 1e-4)?;
     }
     for sigma in [0.05, 0.5] {
-        let painted = easel.paint_in_passes(&uneven_ball(sigma)?, SMALL, 64)?;
+        let painted = easel.paint_in_passes(&uneven_ball(sigma)?, easel.size_in_media()?, 64)?;
         let documented = if easel.has_bias() { AT_BOUNDARIES } else { 0.0 };
         judgement.mean_documented(
             &format!("scatters {sigma:e} per metre in a furnace"),

@@ -1,5 +1,7 @@
 //! Exact counts of the queries of photon maps.
 
+use crate::gpu::shaders::constants::BEAM_BOUNCES;
+
 /// Exact counts of queries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[non_exhaustive]
@@ -24,8 +26,8 @@ impl std::ops::AddAssign for GatherCounts {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[non_exhaustive]
 pub struct RayFetches {
-    /// Queries of rays after the first one of a path, which may be one that has only crossed a boundary.
-    pub later_queries: u64,
+    /// Queries of the first ray of a path, of the second one, which may be one behind a boundary that the first has only crossed, and so on; the last number has all later ones, too.
+    pub queries_by_bounce: [u64; BEAM_BOUNCES as usize],
     /// Nodes of the map that were fetched, two at a time, once for all rays of a subgroup that go through it together.
     pub nodes: u64,
     /// Records, likewise.
@@ -34,9 +36,18 @@ pub struct RayFetches {
     pub tests: u64,
 }
 
+impl RayFetches {
+    /// Queries of rays after the first one of a path.
+    pub fn later_queries(&self) -> u64 {
+        self.queries_by_bounce[1..].iter().sum()
+    }
+}
+
 impl std::ops::AddAssign for RayFetches {
     fn add_assign(&mut self, other: Self) {
-        self.later_queries += other.later_queries;
+        for (sum, more) in self.queries_by_bounce.iter_mut().zip(other.queries_by_bounce) {
+            *sum += more;
+        }
         self.nodes += other.nodes;
         self.records += other.records;
         self.tests += other.tests;

@@ -308,7 +308,7 @@ impl Beam {
     pub fn fetches(&self) -> Result<RayFetches> {
         let counters = self.counters_readback.read::<Counters>(0, 1)?[0];
         Ok(RayFetches {
-            later_queries: u64::from(counters.later_queries),
+            queries_by_bounce: counters.queries_by_bounce.map(u64::from),
             nodes: wide_counter(counters.nodes),
             records: wide_counter(counters.records),
             tests: wide_counter(counters.tests),

@@ -1,7 +1,8 @@
 //! Where photons' collisions and where their ways are the better sight of light in fog: the variance of both by the density of the medium and the width of kernels, and of planes, which have none.
 //!
 //! The order is published by J. Křivánek et al., "Unifying Points, Beams, and Paths in Volumetric Light Transport Simulation", ACM TOG 33(4), 2014, with SmallUPBP; by B. Bitterli and W. Jarosz,
-//! "Beyond Points and Beams", ACM TOG 36(4), 2017, with Tungsten; and on GPUs by GPUUPBP. Variances are those between pictures of independent photons under kernels that do not shrink, so that what
+//! "Beyond Points and Beams", ACM TOG 36(4), 2017, with Tungsten; and on GPUs by N. Moonen and A. Jalba, "Efficient Hardware Acceleration of Robust Volumetric Light Transport Simulation", CGF 42(6), 2023,
+//! with GPUUPBP (github.com/nolmoonen/gpuupbp). Variances are those between pictures of independent photons under kernels that do not shrink, so that what
 //! kernels blur is no part of them.
 
 use std::sync::Arc;

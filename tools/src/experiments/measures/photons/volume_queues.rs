@@ -4,6 +4,7 @@
 //! GPU of its time; scenes and media are those of `scenarios`.
 
 use clerestory::gpu::Gpu;
+use clerestory::gpu::shaders::constants::BEAM_BOUNCES;
 use clerestory::techniques::photon_mapping::{MapQuery, MapQueue, MapStages, PhotonMapper, PhotonSettings};
 use clerestory::{Result, scene};
 
@@ -162,6 +163,9 @@ rows! {
         stage: String = "stage",
         jobs: Option<f64> = "jobs per frame",
         later_jobs: Option<f64> = "of them after the first ray of a path",
+        second_jobs: Option<f64> = "of its second ray",
+        third_jobs: Option<f64> = "of its third",
+        further_jobs: Option<f64> = "of its fourth and later ones",
         first: Repeats = "first ray of a path (ms)",
         later: Repeats = "after it (ms)",
         share: Repeats = "share of the frame (%)",
@@ -286,12 +290,12 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario) -> Resu
         mapper(gpu, &scene, size, settings)
     };
     let mut taken = Vec::new();
-    let mut later = 0;
+    let mut by_bounce = [0; BEAM_BOUNCES as usize];
     for form in &FORMS {
         let mut counting = with(form, MapStages::Stream, true)?;
         Frame::of(&mut counting, 1)?;
         taken.push(Taken::of(&counting, form));
-        later = counting.counts().ray_fetches.later_queries;
+        by_bounce = counting.counts().ray_fetches.queries_by_bounce;
     }
     let mut mappers: Vec<PhotonMapper> = FORMS
         .iter()
@@ -333,14 +337,19 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario) -> Resu
         .map(|frames| repeats(frames, |frame| frame.stage(ESTIMATION)))
         .collect();
     let pixels = f64::from(size[0] * size[1]);
+    // In all, after the first ray of a path, and bounce by bounce, where that is counted.
     let jobs = |stage: &str| {
         let rays = eye.extend_rays as f64 * per_frame;
         match stage {
-            RAYS | SCATTERING => (Some(rays), Some(rays - pixels)),
-            ESTIMATION => (Some(counts.beams.queries as f64 * per_frame), Some(later as f64)),
-            SURFACES => (Some(counts.gather.queries as f64 * per_frame), None),
-            SHADOWS => (Some(eye.shadow_rays as f64 * per_frame), None),
-            _ => (None, None),
+            RAYS | SCATTERING => (Some(rays), Some(rays - pixels), None),
+            ESTIMATION => {
+                let later: u64 = by_bounce[1..].iter().sum();
+                let asked = counts.beams.queries as f64 * per_frame;
+                (Some(asked), Some(later as f64), Some(by_bounce.map(|jobs| jobs as f64)))
+            }
+            SURFACES => (Some(counts.gather.queries as f64 * per_frame), None, None),
+            SHADOWS => (Some(eye.shadow_rays as f64 * per_frame), None, None),
+            _ => (None, None, None),
         }
     };
     let mut found = Found {
@@ -373,12 +382,16 @@ fn scene_of_forms(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario) -> Resu
     let rays = eye.extend_rays as f64 * per_frame;
     found.fusions = fusions(scenario, [&turns[0], &turns[FORMS.len()]], [pixels, rays - pixels]);
     for (place, (stage, _)) in STAGES.iter().enumerate().filter(|(_, (stage, _))| *stage != FUSED) {
-        let (jobs, later_jobs) = jobs(stage);
+        let (jobs, later_jobs, by_bounce) = jobs(stage);
+        let of_bounce = |bounce: usize| by_bounce.map(|jobs| jobs[bounce]);
         found.stages.push(Stage {
             scene: scenario.name.into(),
             stage: (*stage).into(),
             jobs,
             later_jobs,
+            second_jobs: of_bounce(1),
+            third_jobs: of_bounce(2),
+            further_jobs: of_bounce(3),
             first: repeats(&turns[0], |frame| frame.stages[place][0]),
             later: repeats(&turns[0], |frame| frame.stages[place][1]),
             share: repeats(&turns[0], |frame| 1e2 * frame.stage(stage) / frame.all()),
@@ -436,7 +449,10 @@ impl Study for Found {
                 "Tests stand for instructions. Bytes are those of nodes and records that are fetched, and of ways and places that a queue hands on; rates are reciprocals of times.",
             )
             .and(Findings::of(&self.stages, &[]))
-            .note("A stage is one kernel or a few, over the jobs of a bounce.")
+            .note(
+                "A stage is one kernel or a few, over the jobs of a bounce. Of density estimation along rays the jobs of each bounce are counted, by the kernels that count what they fetch; of the other stages \
+                 those of the first bounce, a pixel each, and of all.",
+            )
             .and(Findings::of(&self.fusions, OF_FUSIONS))
             .note(
                 "Type I by itself, by a kernel for the closest hits of rays and one for their ways through media and the queries along them, or by one for all that, whose pictures have the same bits; passes are \
