@@ -27,7 +27,7 @@ const MITSUBA: &str = "Mitsuba";
 
 rows! {
     /// A scene by both renderers.
-    pub(super) struct Agreement = "Agreement within noise" by [scene] {
+    struct Agreement = "Agreement within noise" by [scene] {
         scene: String = "scene",
         shows: String = "what it tests",
         verdict: Option<String> = "verdict",
