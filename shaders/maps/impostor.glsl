@@ -88,10 +88,14 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
         // A point that the map's place does not see is no bracket.
         is_at_point = is_at_point || g <= 1.0;
     }
-    // The hybrid looks its other beginning up in a turn more of the loop below, without a bracket yet: drivers that follow branches with all lanes would look it up for rays that need it not.
-    bool begins_in_loop = IMPOSTOR_METHOD == IMPOSTOR_HYBRID && !is_at_point;
     float begin = is_at_point ? 0.0 : across;
-    if (IMPOSTOR_METHOD != IMPOSTOR_HYBRID && !is_at_point) {
+    bool begins_in_loop = false;
+    uint turns = IMPOSTOR_STEPS;
+    if (IMPOSTOR_METHOD == IMPOSTOR_HYBRID) {
+        // It looks its other beginning up in a turn more of the loop below, without a bracket yet: drivers that follow branches with all lanes would look it up for rays that need it not.
+        begins_in_loop = !is_at_point;
+        turns += uint(begins_in_loop);
+    } else if (!is_at_point) {
         g = impostor_ratio(layer, x, r, begin);
     }
     vec2 last = vec2(begin, g);
@@ -101,7 +105,6 @@ float impostor_by_steps(uint layer, vec3 x, vec3 r, float farthest) {
     vec2 under = last;
     vec2 over = last;
     d = begins_in_loop ? begin : clamp(begin + impostor_step(last, false, last, far), 0.0, reach);
-    uint turns = begins_in_loop ? IMPOSTOR_STEPS + 1u : IMPOSTOR_STEPS;
     [[dont_unroll]] for (uint i = 0u; i < turns; ++i) {
         vec2 guess = vec2(d, impostor_ratio(layer, x, r, d));
         vec2 other = last;
