@@ -2,6 +2,9 @@
 //
 // BG-4: analytic free flight in homogeneous media and delta tracking in grids, one walk for all bands (transport/medium.glsl, transport/media_tracking.glsl). Where nothing is
 // scattered there are no collisions, and light is weighed by the transmittance instead. A walk of a slot and a round has one flight, whichever kernel asks for it.
+// Some kernels have flights of their own: path_medium.comp also samples the way by the angle under which a light sees it, from the segment and the grid's walk that it flies through, and ends
+// ways through grids where such samples end; vpl_medium_gather.comp ends them there, too, to follow the same paths; photon_medium.comp stores whole ways, and footprints that need the
+// density of a collision.
 // Expects walk/draws.glsl, the media of scene/media.glsl, and the constants of transport/features.glsl and transport/media_features.glsl.
 #ifndef CLERESTORY_WALK_FLIGHT_GLSL
 #define CLERESTORY_WALK_FLIGHT_GLSL

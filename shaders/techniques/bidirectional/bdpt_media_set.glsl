@@ -10,12 +10,21 @@
 
 // descriptor set 3 from binding 8: BidirectionalMediaSet
 
+// How a path's flight has ended where it is joined.
+struct FlightEnd {
+    vec3 weight;    // of the throughput
+    float t;        // of a collision, along the ray
+    uint medium;    // of a collision, or NO_MEDIUM at a surface
+    uint interior;  // body that the way was in, or OUTSIDE
+};
+
 // Where the connections of a place go on.
 struct MediumConnectionState {
     vec3 sum;
-    uint next;      // connection
-    uint begun;     // 1 where its ray is under way
+    uint next;         // connection
+    uint begun;        // 1 where its ray is under way
     MediumRay ray;
+    FlightEnd flight;  // that it does not repeat
 };
 
 layout(set = 3, binding = 8) uniform utextureBuffer media_records;

@@ -4,7 +4,7 @@
 //
 // Collisions are those of bdpt_eye_medium.comp, by the same random numbers: a path is joined at its collision or at its surface, never at both, with the weight that flights have; one
 // that stops in a grid is joined where it goes on. An invocation is for a place, and takes so many stretches of shadow rays a dispatch. One that has not come to its end notes where it
-// is, marks itself and stalls the wave; further dispatches go on there.
+// is and how the path's flight has ended, marks itself and stalls the wave; further dispatches go on there.
 //
 // CL-BDPT-MEDIA: E. Lafortune and Y. Willems, "Rendering Participating Media with Bidirectional Path Tracing", 1996. Deterministic in (seed, pixel, sample).
 // variant: driver
@@ -47,7 +47,17 @@ layout(push_constant, scalar) uniform Push {
 // Tells the walks of these rays through grids from those of the paths' own.
 const uint JOINT_RATIO_SEED = 0x6a747261u;
 
-bool begin_receiver(uint slot, uint place, out Receiver r) {
+// The flight of the path in a slot, which is in that state; whether it ends where something may be joined.
+bool end_flight(uint slot, WalkState path, Hit hit, uint path_state, out FlightEnd end) {
+    bool scatters = state_behind(path_state, LOBE_VOLUME) != PATH_SET_DEAD;
+    Flight f = fly(slot, path, hit, push.surrounding, scatters, vec3(0.0), medium_state(slot));
+    bool collides = f.outcome == GRID_COLLIDED;
+    end = FlightEnd(f.weight, f.t, collides ? f.medium : NO_MEDIUM, f.crossing.interior);
+    return collides || !(f.outcome == GRID_STOPPED || hit.triangle == NO_HIT || f.crossing.boundary);
+}
+
+// Prepares the receiver of a place, whose path's flight is known where it goes on; false where nothing is joined.
+bool begin_receiver(uint slot, uint place, inout FlightEnd end, out Receiver r) {
     WalkState path = load_walk(slot);
     Hit hit = load_hit(place);
     r.state = take_path_state(path);
@@ -56,24 +66,22 @@ bool begin_receiver(uint slot, uint place, out Receiver r) {
     if (r.bounce + 2u > push.most_bounces) {
         return false;
     }
-    Flight f = fly(slot, path, hit, push.surrounding, state_behind(r.state, LOBE_VOLUME) != PATH_SET_DEAD, vec3(0.0), medium_state(slot));
-    r.medium = NO_MEDIUM;
-    r.interior = f.crossing.interior;
-    r.throughput = path.throughput * f.weight;
-    if (f.outcome == GRID_COLLIDED) {
-        r.medium = f.medium;
-        r.arrival = collision_at(path.origin + f.t * path.direction, path.direction);
-        r.weights = eye_weights_under(slot, path, 1.0, f.t);
-        return r.throughput != vec3(0.0);
-    }
-    if (f.outcome == GRID_STOPPED || hit.triangle == NO_HIT || f.crossing.boundary) {
+    if (push.goes_on == 0u && !end_flight(slot, path, hit, r.state, end)) {
         return false;
+    }
+    r.medium = end.medium;
+    r.interior = end.interior;
+    r.throughput = path.throughput * end.weight;
+    if (is_collision(r.medium)) {
+        r.arrival = collision_at(path.origin + end.t * path.direction, path.direction);
+        r.weights = eye_weights_under(slot, path, 1.0, end.t);
+        return r.throughput != vec3(0.0);
     }
     r.arrival = arrival_at(hit, path.direction, push.scene_lower, push.scene_upper);
     if (arrival_is_unlit(r.arrival) || !arrival_has_rough_lobes(r.arrival)) {
         return false;
     }
-    r.interior = arrival_interior(r.arrival, f.crossing.interior);
+    r.interior = arrival_interior(r.arrival, end.interior);
     r.weights = eye_weights(slot, path, r.arrival, hit.t);
     return r.throughput != vec3(0.0);
 }
@@ -125,14 +133,15 @@ void main() {
     }
     walk_resume[place] = CONNECT_DONE;
     uint slot = load_slot(place);
-    Receiver r;
-    if (!begin_receiver(slot, place, r)) {
-        count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
-        return;
-    }
-    MediumConnectionState at = MediumConnectionState(vec3(0.0), 0u, 0u, MediumRay(vec3(1.0), INDEX_START, no_hit(0.0), 0.0, OUTSIDE, 0u));
+    MediumConnectionState at = MediumConnectionState(vec3(0.0), 0u, 0u, MediumRay(vec3(1.0), INDEX_START, no_hit(0.0), 0.0, OUTSIDE, 0u),
+                                                     FlightEnd(vec3(1.0), 0.0, NO_MEDIUM, OUTSIDE));
     if (goes_on) {
         at = medium_connection_states[place];
+    }
+    Receiver r;
+    if (!begin_receiver(slot, place, at.flight, r)) {
+        count_work(GRID_ITERATION_WORK * grid_iterations, WORK_UNIT);
+        return;
     }
     uint first = at.next;
     uint rays;

@@ -38,11 +38,8 @@ uint states_before(uint states, uint lobes) {
     return before;
 }
 
-// Of a class of lobes of a surface, LOBE_DIFFUSE or LOBE_GLOSSY, or in a medium, where `here` names the one.
+// Of a class of lobes of a surface, LOBE_DIFFUSE or LOBE_GLOSSY, or in a medium, where `here` names the one; of path sets with an automaton.
 JointLobes joint_lobes(uint state, uint here, uint states) {
-    if (!HAS_PATH_AUTOMATON) {
-        return JointLobes(LOBE_ALL, PATH_SET_LOBES);
-    }
     uint behind = state_behind(state, here);
     return JointLobes(here, behind == PATH_SET_DEAD ? 0u : lobes_into(behind, states));
 }

@@ -3,11 +3,12 @@
 use super::*;
 use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{DensityGrid, Environment, Medium, Phase};
+use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase};
 use clerestory::techniques::bidirectional::BidirectionalCounts;
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 use clerestory_tests::child::{hash_in_child, print_hash};
 use clerestory_tests::gpu;
+use clerestory_tests::render::{camera_aslant, floor};
 
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_BIDIRECTIONAL_HASH_OF_FOG";
@@ -36,22 +37,28 @@ pub(super) fn fog_room(phase: Phase) -> Scene {
     scene
 }
 
+/// Adds a medium three to four times as dense, and the material of an invisible boundary around it.
+fn add_boundary(scene: &mut Scene, phase: Phase) -> u32 {
+    let interior = scene.media.len() as u32;
+    scene.media.push(Medium {
+        sigma_s: Vec3::new(2.0, 3.0, 4.0),
+        ..fog(phase)
+    });
+    scene.add_material(Material {
+        name: "boundary".into(),
+        boundary: true,
+        interior: Some(interior),
+        ..Material::default()
+    })
+}
+
 /// The room with a lamp and a point light, and a body of a denser medium behind an invisible boundary.
 fn fog_body(phase: Phase) -> Scene {
     let mut scene = room();
     add_lamp(&mut scene, 3.0);
     add_point(&mut scene, Vec3::new(0.6, 0.6, 0.5), 0.5);
     scene.name = format!("body of fog with {phase:?}");
-    scene.media.push(Medium {
-        sigma_s: Vec3::new(2.0, 3.0, 4.0),
-        ..fog(phase)
-    });
-    let boundary = scene.add_material(Material {
-        name: "boundary".into(),
-        boundary: true,
-        interior: Some(0),
-        ..Material::default()
-    });
+    let boundary = add_boundary(&mut scene, phase);
     scene.place(cuboid(
         "fog",
         boundary,
@@ -61,8 +68,47 @@ fn fog_body(phase: Phase) -> Scene {
     scene
 }
 
+/// Two bodies of fog, of which one is lit by a lamp and the other one is seen: a black plate hides the lamp from that one, but not the bodies from each other. No two collisions that light comes by
+/// to the camera after two scatterings are near each other.
+fn two_bodies() -> Scene {
+    let mut scene = Scene {
+        name: "two bodies".into(),
+        ..Scene::default()
+    };
+    let boundary = add_boundary(&mut scene, Phase::Isotropic);
+    scene.place(cuboid(
+        "lit",
+        boundary,
+        Vec3::new(-0.9, -0.3, -0.3),
+        Vec3::new(-0.3, 0.3, 0.3),
+    ));
+    scene.place(cuboid(
+        "seen",
+        boundary,
+        Vec3::new(0.3, -0.3, -0.3),
+        Vec3::new(0.9, 0.3, 0.3),
+    ));
+    let black = scene.add_material(Material::lambert("black", Vec3::ZERO));
+    scene.place(cuboid(
+        "plate",
+        black,
+        Vec3::new(-0.02, -0.05, -1.0),
+        Vec3::new(0.02, 2.0, 1.0),
+    ));
+    let shining = scene.add_material(lamp(Vec3::splat(3.0)));
+    scene.place(cuboid(
+        "lamp",
+        shining,
+        Vec3::new(-0.8, 0.9, -0.2),
+        Vec3::new(-0.4, 1.0, 0.2),
+    ));
+    let (eye, target) = (DVec3::new(0.6, 0.0, 2.5), DVec3::new(0.6, 0.0, 0.0));
+    scene.cameras.push(Camera::look_at("main", eye, target, DVec3::Y, 0.2));
+    scene
+}
+
 /// The body, with a density that changes across it, beside fog everywhere else if so wanted.
-fn cloud(around: bool) -> Scene {
+pub(super) fn cloud(around: bool) -> Scene {
     let mut scene = fog_body(FORWARD);
     scene.name = format!("cloud, in fog: {around}");
     let density = |p: DVec3| (2.0 * p.x * (0.5 + 0.5 * (7.0 * p.y).sin()) + 0.3 * p.z) as f32;
@@ -136,6 +182,58 @@ fn bodies_in_fog_agree_with_the_path_tracer() {
     });
 }
 
+/// Rays of the camera begin in the body, and so do those that light subpaths are shown by.
+#[test]
+fn cameras_in_bodies_of_fog_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let mut scene = fog_body(FORWARD);
+        scene.name = "inside a body".into();
+        let (eye, target) = (DVec3::new(0.5, -0.1, 0.2), DVec3::new(-0.6, -0.6, -0.6));
+        scene.cameras = vec![Camera::look_at("inside", eye, target, DVec3::Y, 0.9)];
+        let own = BidirectionalSettings {
+            // Much of what is seen near the camera is shown by these.
+            light_paths: 2048,
+            least_bounces: 1,
+            ..settings()
+        };
+        let reference = traced(gpu, &scene, "bounces=1..", REFERENCE);
+        passes(gpu, &scene, &own, SAMPLES).expect_same_as(&scene.name, &reference);
+    });
+}
+
+/// The first collision of light from infinity has a density per area across its beam; a lens sees the body out of focus.
+#[test]
+fn lenses_and_parallel_light_meet_bodies_of_fog() {
+    with_gpu(|gpu| {
+        let mut scene = Scene {
+            name: "sunlit body".into(),
+            ..Scene::default()
+        };
+        let matte = scene.add_material(Material::lambert("matte", Vec3::new(0.8, 0.7, 0.6)));
+        scene.place(floor("floor", matte, 1.0, 0.0));
+        let boundary = add_boundary(&mut scene, FORWARD);
+        scene.place(cuboid(
+            "fog",
+            boundary,
+            Vec3::new(-0.4, 0.1, -0.4),
+            Vec3::new(0.4, 0.7, 0.4),
+        ));
+        scene.add_light(
+            "sun",
+            LightKind::Directional {
+                direction: Vec3::new(0.3, -1.0, -0.2).normalize(),
+                irradiance: Vec3::new(2.0, 1.5, 1.0),
+            },
+        );
+        scene.cameras.push(Camera {
+            lens_radius: 0.1,
+            focus_distance: 2.0,
+            ..camera_aslant()
+        });
+        expect_agreement(gpu, &scene, SAMPLES, REFERENCE);
+    });
+}
+
 /// Eye paths alone find what a medium emits; what is emitted and scattered counts once.
 #[test]
 fn media_that_emit_agree_with_the_path_tracer() {
@@ -194,6 +292,24 @@ fn each_way_to_make_a_path_in_fog_finds_the_same_light() {
     });
 }
 
+/// By an eye path of one collision and a light subpath of another, which make all of these paths.
+#[test]
+fn joined_collisions_find_all_that_is_scattered_twice() {
+    with_gpu(|gpu| {
+        let scene = two_bodies();
+        let reference = traced(gpu, &scene, "bounces=2", 2 * REFERENCE);
+        assert!(reference.mean().iter().all(|(mean, _)| *mean > 0.0));
+        let alone = BidirectionalSettings {
+            strategies: Strategies::Connections,
+            light_paths: 1024,
+            least_bounces: 2,
+            most_bounces: Some(2),
+            ..settings()
+        };
+        passes(gpu, &scene, &alone, 2 * SAMPLES).expect_same_as(&scene.name, &reference);
+    });
+}
+
 /// The caustic that a glass ball throws into fog of a lamp that eye paths hardly ever meet: what photons bring there, blurred over their kernels, is what light subpaths bring.
 #[test]
 fn caustics_of_a_tiny_lamp_in_fog_are_those_of_photons() {
@@ -231,9 +347,15 @@ fn caustics_of_a_tiny_lamp_in_fog_are_those_of_photons() {
 #[test]
 fn pictures_of_media_do_not_depend_on_how_the_work_is_cut_up() {
     with_gpu(|gpu| {
-        for scene in [fog_body(Phase::Isotropic), cloud(true)] {
+        for (scene, set) in [
+            (fog_body(Phase::Isotropic), "all"),
+            (cloud(true), "all"),
+            // By states.
+            (cloud(true), "LVE|LDVE|LVDE"),
+        ] {
             // Pixels that fill no workgroup.
             let base = BidirectionalSettings {
+                path_set: set.parse().expect("path set"),
                 light_paths: 200,
                 samples_at_once: 4,
                 connections: 3,
@@ -261,7 +383,7 @@ fn pictures_of_media_do_not_depend_on_how_the_work_is_cut_up() {
                     ray_quota,
                     ..base.clone()
                 };
-                let what = format!("{}: {paths_in_flight} {submission_work} {ray_quota}", scene.name);
+                let what = format!("{}, {set}: {paths_in_flight} {submission_work} {ray_quota}", scene.name);
                 let (parted, of_parted) = of(&settings);
                 assert_eq!(parted, whole, "{what}");
                 assert_eq!(done(&of_parted), done(&counts), "{what}");

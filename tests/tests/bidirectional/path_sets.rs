@@ -1,6 +1,6 @@
 //! Parts of the light by expressions, against the path tracer's pictures of the same.
 
-use super::media::fog_room;
+use super::media::{cloud, fog_room};
 use super::*;
 use clerestory::scene::Phase;
 
@@ -45,6 +45,17 @@ fn expressions_agree_with_the_path_tracer() {
             let what = format!("{}, {set}", fog.name);
             passes(gpu, &fog, &of(set), 128).expect_same_as(&what, &traced(gpu, &fog, set, 4096));
         }
+    });
+}
+
+/// A grid beside a homogeneous medium: flights whose collisions no path of the set has pass through.
+#[test]
+fn expressions_in_grids_agree_with_the_path_tracer() {
+    with_gpu(|gpu| {
+        let scene = cloud(true);
+        let what = format!("{}, LVE|LDVE", scene.name);
+        let reference = traced(gpu, &scene, "LVE|LDVE", 1024);
+        passes(gpu, &scene, &of("LVE|LDVE"), 128).expect_same_as(&what, &reference);
     });
 }
 

@@ -1,23 +1,23 @@
 //! Eye subpaths joined to light subpaths: a stage between arrival and shading. Memory is that of the places, whatever the number of vertices.
 
 use super::eye::EyeMemory;
-use super::kernels::{Counters, check_sweeps, media_set_of, quota_of, rays_of_submission, stretches_of};
+use super::kernels::{Counters, check_sweeps, media_set_of, quota_of, stretches_of};
 use super::settings::BidirectionalSettings;
 use crate::Result;
 use crate::gpu::interface::BindingSet;
-use crate::gpu::shaders::constants::{NO_MEDIUM, WALK_GROUP};
+use crate::gpu::shaders::constants::NO_MEDIUM;
 use crate::gpu::shaders::sets::{BidirectionalMediaSet, BidirectionalSet, WaveSet};
 use crate::gpu::shaders::techniques::bidirectional::{bdpt_connect, bdpt_medium_connect};
 use crate::gpu::{Access, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};
 use crate::transport::{GpuScene, surface_spec};
-use crate::walk::{ArrivalStage, Places, StoppedPlaces, WalkKey, stage_barrier};
+use crate::walk::{ArrivalStage, Places, StoppedPace, StoppedPlaces, WalkKey, stage_barrier};
 
 /// The kernel of connections.
 pub(super) struct Connect {
     kernel: ConnectKernel,
     connections: u32,
     bounces: [u32; 2],
-    rays_at_once: u32,
+    pace: StoppedPace,
 }
 
 enum ConnectKernel {
@@ -50,16 +50,18 @@ pub(super) struct ConnectStage<'a> {
 
 impl Connect {
     pub fn new(gpu: &Gpu, scene: &GpuScene, is_parallel: bool, settings: &BidirectionalSettings) -> Result<Self> {
-        let kernel = if scene.profile().media.any() {
+        let media = scene.profile().media;
+        let (kernel, rays) = if media.any() {
             ConnectKernel::in_media(gpu, scene, is_parallel, settings)?
         } else {
-            ConnectKernel::on_surfaces(gpu, scene, is_parallel, settings)?
+            let kernel = ConnectKernel::on_surfaces(gpu, scene, is_parallel, settings)?;
+            (kernel, settings.connections)
         };
         Ok(Self {
             kernel,
             connections: settings.connections,
             bounces: settings.bounces(),
-            rays_at_once: rays_of_submission(gpu),
+            pace: StoppedPace::new(gpu.caps().kind, rays, media.heterogeneous),
         })
     }
 
@@ -68,6 +70,11 @@ impl Connect {
             ConnectKernel::Surfaces(kernel) => kernel.info(),
             ConnectKernel::Media(kernel) => kernel.info(),
         }
+    }
+
+    /// A submission in which the stage may have been recorded took so long.
+    pub fn submitted(&mut self, seconds: f64) {
+        self.pace.submitted(seconds);
     }
 }
 
@@ -91,7 +98,13 @@ impl ConnectKernel {
         traversal.pipeline(gpu, &spec).map(Self::Surfaces)
     }
 
-    fn in_media(gpu: &Gpu, scene: &GpuScene, is_parallel: bool, settings: &BidirectionalSettings) -> Result<Self> {
+    /// With the stretches of shadow rays that a place takes in a dispatch.
+    fn in_media(
+        gpu: &Gpu,
+        scene: &GpuScene,
+        is_parallel: bool,
+        settings: &BidirectionalSettings,
+    ) -> Result<(Self, u32)> {
         let (traversal, media) = (scene.index_traversal(), scene.profile().media);
         let (stretches, index_quota) = stretches_of(gpu, scene, settings, true)?;
         let spec = surface_spec!(bdpt_medium_connect, scene, {
@@ -111,7 +124,7 @@ impl ConnectKernel {
             index_kind: traversal.kind(),
             ..Default::default()
         });
-        traversal.pipeline(gpu, &spec).map(Self::Media)
+        Ok((Self::Media(traversal.pipeline(gpu, &spec)?), stretches))
     }
 }
 
@@ -213,7 +226,8 @@ impl ArrivalStage for ConnectStage<'_> {
         pass.copy(counts.device.view(), counts.readback.view())
     }
 
-    /// Sweep after sweep over the places, until none has connections left; after each the device's count of these is read.
+    /// Sweep after sweep over the places, until none has connections left; after each the device's count of these is read. Parts count places of all sweeps. The first sweep, in which most
+    /// places go on, tells how many a driver that watches has time for.
     fn record_stopped(
         &self,
         recorder: &mut Recorder,
@@ -222,33 +236,32 @@ impl ArrivalStage for ConnectStage<'_> {
         part: u64,
     ) -> Result<Option<u64>> {
         let (connect, counts) = (self.connect, &self.memory.counts);
-        let places = (connect.rays_at_once / connect.connections).next_multiple_of(WALK_GROUP);
-        let ranges = u64::from(stopped.places.div_ceil(places)).max(1);
-        let (sweep, range) = (part / ranges, part % ranges);
-        if range == 0 && sweep > 0 {
+        let all = stopped.places.max(1);
+        let (sweep, first) = (part / u64::from(all), (part % u64::from(all)) as u32);
+        if first == 0 && sweep > 0 {
             if counts.read()?.remaining == 0 {
                 return Ok(None);
             }
             check_sweeps("bdpt_connect", sweep)?;
         }
+        let count = connect.pace.places().min(all - first);
+        if sweep == 0 {
+            connect.pace.record(count);
+        }
         recorder.pass("bidirectional: connect on", |pass| {
-            if range == 0 {
+            if first == 0 {
                 let offset = std::mem::offset_of!(Counters, remaining) as u64;
                 pass.fill(counts.device.slice(offset, size_of::<u32>() as u64), 0)?;
                 pass.memory_barrier(Access::TRANSFER_WRITE, Access::COMPUTE);
             }
-            let over = Over::Stopped {
-                first: range as u32 * places,
-                count: places.min(stopped.places),
-            };
-            self.dispatch(pass, wave, over)?;
-            if range + 1 == ranges {
+            self.dispatch(pass, wave, Over::Stopped { first, count })?;
+            if first + count == all {
                 pass.memory_barrier(Access::COMPUTE, Access::TRANSFER_READ);
                 self.read_back(pass)?;
             }
             stage_barrier(pass);
             Ok(())
         })?;
-        Ok(Some(part + 1))
+        Ok(Some(part + u64::from(count)))
     }
 }

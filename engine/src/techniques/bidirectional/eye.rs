@@ -110,15 +110,10 @@ impl EyeMemory {
         let format = vk::Format::R32G32B32A32_UINT;
         let states = if settings.joins() { slots } else { 1 };
         let aovs = if settings.aovs { slots } else { 1 };
-        let of_connection = if has_media {
-            size_of::<MediumConnectionState>()
-        } else {
-            size_of::<ConnectionState>()
-        };
         Ok(Self {
             aovs: work(gpu, "path aovs", size_of::<PathAov>(), aovs)?,
             weights: work(gpu, "eye subpath weights", size_of::<PartialWeights>(), slots)?,
-            states: work(gpu, "connection states", of_connection, states)?,
+            states: work(gpu, "connection states", connection_bytes(has_media), states)?,
             path_states: path_states(gpu, settings)?,
             counts: Counts::new(gpu)?,
             no_vertices: gpu.storage_texels("no light vertices", Category::Work, format, 1)?,
@@ -145,11 +140,15 @@ impl EyeMemory {
             0 => default_slots(gpu),
             wanted => wanted,
         };
-        let slots = wanted
+        let mut slots = wanted
             .min(paths)
             .max(1)
             .next_multiple_of(WALK_GROUP)
             .min(slots_of_device(gpu));
+        if settings.joins() {
+            let range = gpu.caps().max_storage_buffer_range;
+            slots = slots.min(slots_within(range, connection_bytes(has_media)));
+        }
         WaveBuffers::within_memory(gpu, slots, needs, |slots| Self::new(gpu, slots, has_media, settings))
     }
 
@@ -175,6 +174,21 @@ impl EyeMemory {
             ..set_of(vertices, &self.weights)
         }
     }
+}
+
+/// What a place keeps of its connections.
+fn connection_bytes(has_media: bool) -> usize {
+    if has_media {
+        size_of::<MediumConnectionState>()
+    } else {
+        size_of::<ConnectionState>()
+    }
+}
+
+/// Slots with so many bytes each of which a binding of so many holds all, in whole workgroups.
+fn slots_within(range: u64, bytes: usize) -> u32 {
+    let slots = (range / bytes as u64).min(u32::MAX.into()) as u32;
+    slots - slots % WALK_GROUP
 }
 
 /// The kernels of eye paths; all but the last depend on the camera.
@@ -260,6 +274,13 @@ impl EyeKernels {
         all.extend(self.medium.as_ref().map(ComputePipeline::info));
         all.extend(self.connect.as_ref().map(Connect::pipeline));
         all
+    }
+
+    /// A submission of eye paths took so long.
+    pub fn submitted(&mut self, seconds: f64) {
+        if let Some(connect) = &mut self.connect {
+            connect.submitted(seconds);
+        }
     }
 
     /// A pixel's area in the picture at distance 1, or in m² of an orthographic camera.
@@ -478,4 +499,27 @@ pub(super) fn record_resolve(
         );
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::shaders::types::WalkState;
+
+    /// Those of media are larger than what else a slot has, by which waves are made.
+    #[test]
+    fn states_of_connections_fit_a_binding() {
+        const { assert!(size_of::<MediumConnectionState>() > size_of::<WalkState>()) };
+        let range = 1 << 27;
+        for has_media in [false, true] {
+            let bytes = connection_bytes(has_media);
+            let slots = slots_within(range, bytes);
+            assert_eq!(slots % WALK_GROUP, 0);
+            assert!(u64::from(slots) * bytes as u64 <= range, "{slots} of {bytes} bytes");
+            assert!(
+                u64::from(slots + WALK_GROUP) * bytes as u64 > range,
+                "{slots} of {bytes} bytes"
+            );
+        }
+    }
 }

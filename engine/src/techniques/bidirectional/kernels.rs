@@ -22,15 +22,27 @@ const CONNECTION_ITERATIONS: u32 = 6;
 const STATE_ITERATIONS: u32 = 2 * (PATH_SET_LOBE_COUNT + 1) + 2;
 /// Searches for an instance of a connection, beside those of its ray.
 const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
+/// And those for what an invocation looks up once: the surface that its way has come to, the body that it was in, and the material.
+const SEARCHES_ONCE: u32 = 3 * INSTANCE_SEARCH_STEPS;
 /// Stretches of shadow rays through media that a place or a vertex takes in a dispatch, at most.
 const STRETCHES: u32 = 8;
 /// Loop iterations of a ray in one dispatch that are worth fewer stretches in it.
 const QUOTA_WANTED: u32 = 256;
 /// Sweeps over what has stopped before its rays count as endless.
 const SWEEPS_MAX: u64 = 1 << 16;
-/// Rays of a submission that a kernel of many at once makes: a second or less on two cores.
-const SOFTWARE_RAYS: u32 = 1 << 19;
-const DEVICE_RAYS: u32 = 1 << 24;
+/// Lanes of the widest software devices.
+const LANES_MAX: u32 = 16;
+/// A stretch has room beside what an invocation does once.
+const _: () = assert!(
+    grid_walk_iterations(LANES_MAX, GRID_WALK_QUOTA)
+        + SEARCHES_ONCE
+        + CONNECTION_ITERATIONS
+        + STATE_ITERATIONS
+        + SEARCHES
+        + INSTANCE_SEARCH_STEPS
+        + 2 * grid_walk_iterations(LANES_MAX, CONNECTION_GRID_QUOTA)
+        < SOFTWARE_LOOP_CAP
+);
 
 /// Loop iterations after which a ray goes on in a later dispatch, of an invocation with `rays` of them: together they stay below what software drivers run.
 ///
@@ -75,13 +87,13 @@ pub(super) fn stretches_of(
             0
         }
     };
-    let once = if flies { walk(GRID_WALK_QUOTA) } else { 0 };
-    // A boundary is looked up, too.
-    let searches = if profile.keeps_instances {
-        SEARCHES + INSTANCE_SEARCH_STEPS
+    // With each stretch a boundary is looked up, too.
+    let (searches_once, searches) = if profile.keeps_instances {
+        (SEARCHES_ONCE, SEARCHES + INSTANCE_SEARCH_STEPS)
     } else {
-        0
+        (0, 0)
     };
+    let once = searches_once + if flies { walk(GRID_WALK_QUOTA) } else { 0 };
     let beside = beside(settings) + searches + walk(CONNECTION_GRID_QUOTA);
     let mut stretches = STRETCHES;
     loop {
@@ -94,14 +106,6 @@ pub(super) fn stretches_of(
             Err(error) if stretches == 1 => return Err(error),
             _ => stretches /= 2,
         }
-    }
-}
-
-/// Rays of a submission, in whole workgroups.
-pub(super) fn rays_of_submission(gpu: &Gpu) -> u32 {
-    match gpu.caps().kind {
-        DeviceKind::Cpu => SOFTWARE_RAYS,
-        _ => DEVICE_RAYS,
     }
 }
 

@@ -7,11 +7,10 @@
 //! pass is walked again with room for them; what the camera is shown is summed in integers, so that it is the same bits in whatever order; a submission is a bounded piece of work.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::eye::EyeWave;
-use super::kernels::{
-    Counters, Counts, Viewpoint, check_sweeps, media_set_of, path_states, rays_of_submission, set_of, work,
-};
+use super::kernels::{Counters, Counts, Viewpoint, check_sweeps, media_set_of, path_states, set_of, work};
 use super::settings::BidirectionalSettings;
 use super::splats::{CameraSplats, Shown, ShownWalks, SightKernel, splats, vertices_within};
 use crate::gpu::ash::vk;
@@ -27,8 +26,8 @@ use crate::gpu::{
 };
 use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
-    Bounce, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds, slots_of_device,
-    stage_barrier,
+    Bounce, StoppedPace, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds,
+    slots_of_device, stage_barrier,
 };
 use crate::{Error, Result};
 
@@ -47,9 +46,10 @@ enum Phase {
     /// Before the first submission.
     Before,
     Walking(WaveInFlight),
-    /// So many of the vertices have been shown to the camera, and rays of those before were stopped `sweeps` times.
+    /// So many of the vertices have been shown to the camera, and rays of those from there up to `end` were stopped `sweeps` times.
     Showing {
         shown: u32,
+        end: u32,
         sweeps: u64,
     },
     Ready,
@@ -78,6 +78,9 @@ pub(super) struct LightPaths {
     camera: Option<CameraSplats>,
     phase: Phase,
     vertices: u32,
+    /// Vertices of a submission, by what those take whose rays begin; those that go on are some of these.
+    pace: StoppedPace,
+    /// And at most.
     rays_at_once: u32,
     counts: LightCounts,
 }
@@ -186,16 +189,15 @@ impl LightPaths {
             camera: None,
             phase: Phase::Before,
             vertices: 0,
-            rays_at_once: if media.any() {
-                rays_of_submission(gpu).min(MEDIA_RAYS)
-            } else {
-                rays_of_submission(gpu)
-            },
+            pace: StoppedPace::new(gpu.caps().kind, 1, media.heterogeneous),
+            rays_at_once: if media.any() { MEDIA_RAYS } else { u32::MAX },
             counts: LightCounts::default(),
         };
         if settings.strategies.splats() {
             let room = (capacity, paths.rays_at_once);
-            paths.camera = Some(CameraSplats::new(gpu, scene, view, size, settings, room)?);
+            let camera = CameraSplats::new(gpu, scene, view, size, settings, room)?;
+            paths.pace = StoppedPace::new(gpu.caps().kind, camera.stretches, media.heterogeneous);
+            paths.camera = Some(camera);
         }
         Ok(paths)
     }
@@ -234,7 +236,7 @@ impl LightPaths {
     /// Looks through another camera.
     pub fn set_camera(&mut self, view: &Viewpoint, settings: &BidirectionalSettings) -> Result<()> {
         if let Some(camera) = &mut self.camera {
-            camera.sight = SightKernel::new(&self.gpu, &self.walks.scene, view, settings)?;
+            (camera.sight, camera.stretches) = SightKernel::new(&self.gpu, &self.walks.scene, view, settings)?;
             camera.view = *view;
         }
         Ok(())
@@ -267,7 +269,7 @@ impl LightPaths {
                 self.walk(pass, wave)
             }
             Phase::Walking(wave) => self.walk(pass, wave),
-            Phase::Showing { shown, sweeps } => self.show(pass, shown, sweeps),
+            Phase::Showing { shown, end, sweeps } => self.show(pass, [shown, end], sweeps),
             Phase::Ready => {
                 self.phase = Phase::Ready;
                 Ok(Vec::new())
@@ -325,19 +327,28 @@ impl LightPaths {
         self.counts.walks += u64::from(self.walks.count);
         self.counts.vertices += needed;
         self.phase = match self.camera {
-            Some(_) => Phase::Showing { shown: 0, sweeps: 0 },
+            Some(_) => Phase::Showing {
+                shown: 0,
+                end: 0,
+                sweeps: 0,
+            },
             None => Phase::Ready,
         };
         Ok(timings)
     }
 
-    /// Shows some vertices more to the camera, or goes on with those whose rays were stopped; the last submission of them also sums.
-    fn show(&mut self, pass: u32, shown: u32, sweeps: u64) -> Result<Vec<Timings>> {
+    /// Shows some vertices more to the camera, from `shown` on, or goes on with those up to `end` whose rays were stopped; the last submission of them also sums.
+    fn show(&mut self, pass: u32, [shown, end]: [u32; 2], sweeps: u64) -> Result<Vec<Timings>> {
         let Some(camera) = &self.camera else {
             self.phase = Phase::Ready;
             return Ok(Vec::new());
         };
-        let end = shown.saturating_add(self.rays_at_once).min(self.vertices);
+        let end = if sweeps > 0 {
+            end
+        } else {
+            let vertices = self.pace.places().min(self.rays_at_once);
+            shown.saturating_add(vertices).min(self.vertices)
+        };
         let walks = ShownWalks {
             pass,
             group: self.walks.group,
@@ -365,18 +376,30 @@ impl LightPaths {
             p.memory_barrier(Access::COMPUTE, Access::COMPUTE | Access::TRANSFER_READ);
             p.copy(self.walks.counts.device.view(), self.walks.counts.readback.view())
         })?;
+        let clock = Instant::now();
         let mut timings = vec![recorder.submit()?.wait()?];
+        if sweeps == 0 {
+            let waited = clock.elapsed().as_secs_f64();
+            self.pace.record(end - shown);
+            self.pace
+                .submitted(timings[0].untimed.map_or(timings[0].seconds(), |_| waited));
+        }
         let counters = self.walks.counts.read()?;
         if counters.remaining > 0 {
             check_sweeps("bdpt_camera", sweeps + 1)?;
             self.phase = Phase::Showing {
                 shown,
+                end,
                 sweeps: sweeps + 1,
             };
             return Ok(timings);
         }
         if end < self.vertices {
-            self.phase = Phase::Showing { shown: end, sweeps: 0 };
+            self.phase = Phase::Showing {
+                shown: end,
+                end,
+                sweeps: 0,
+            };
             return Ok(timings);
         }
         self.counts.in_view += wide_counter(counters.in_view);

@@ -73,7 +73,8 @@ pub(crate) const ROWS: &[Row] = &[Row {
     bias: Some(Bias::Unbiased),
     tests: &[
         "engine/src/techniques/bidirectional/mis.rs::weights_are_those_of_the_balance_heuristic_and_sum_to_one",
-        "engine/src/techniques/bidirectional/mis.rs::weights_of_paths_through_media_sum_to_one",
+        "engine/src/techniques/bidirectional/mis.rs::collisions_have_squared_distances_and_no_cosines",
+        "engine/src/techniques/bidirectional/rod.rs::all_ways_to_make_paths_through_fog_find_what_it_lets_through",
         "engine/src/techniques/bidirectional/mis.rs::behind_mirrors_only_joints_before_them_count",
         "tests/tests/twins/lights.rs::partial_weights_agree_with_their_twins",
         "tests/tests/bidirectional/strategies.rs::each_way_to_make_a_path_finds_the_same_light",
@@ -148,18 +149,6 @@ mod tests {
                 direct,
                 emitted,
             }
-        }
-
-        /// With some of its inner vertices in media.
-        fn through_media(mut self, random: &mut Random) -> Self {
-            for vertex in 1..self.edges() {
-                if random.below(2) == 0 {
-                    (self.cosines[vertex - 1][1], self.cosines[vertex][0]) = (1.0, 1.0);
-                    self.back[vertex] = self.on[vertex];
-                    self.delta[vertex] = false;
-                }
-            }
-            self
         }
 
         /// Fails unless its weights are those of the balance heuristic and sum to one; the ways to make it.
@@ -340,19 +329,6 @@ mod tests {
         let mut ways = 0;
         for _ in 0..20_000 {
             ways += Path::random(&mut random).check();
-        }
-        assert!(ways > 40_000, "{ways}");
-    }
-
-    /// With vertices in media, which have no cosines and the same density both ways, beside such on surfaces and mirrors. Distances of flights are in no weight and change none: the estimate
-    /// of a path by each way has the path's whole flight, and the weights that multiply it sum to one.
-    #[test]
-    fn weights_of_paths_through_media_sum_to_one() {
-        let mut random = Random(19);
-        let mut ways = 0;
-        for _ in 0..20_000 {
-            let path = Path::random(&mut random);
-            ways += path.through_media(&mut random).check();
         }
         assert!(ways > 40_000, "{ways}");
     }

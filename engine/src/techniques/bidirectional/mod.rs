@@ -7,6 +7,8 @@ mod kernels;
 mod light_paths;
 pub mod mis;
 mod renderer;
+#[cfg(test)]
+mod rod;
 mod settings;
 mod splats;
 

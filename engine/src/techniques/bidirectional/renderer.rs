@@ -11,6 +11,7 @@
 //! camera is of other walks for each sample of a pixel; samples of a pass and pixels share the vertices that eye paths are joined to.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::card::refusals;
 use super::eye::{Cursor, EyeKernels, EyeMemory, EyeParts, EyeStages, EyeWave, record_resolve};
@@ -288,9 +289,15 @@ impl BidirectionalPaths {
         };
         let mut stages = EyeStages::new(parts, self.lights.as_ref(), *wave);
         let before = walks.walked().clone();
+        let clock = Instant::now();
         self.walker.advance(walks, &mut stages)?;
+        let waited = clock.elapsed().as_secs_f64();
         self.counts.note(&before, walks.walked());
         let mut timings = walks.take_timings();
+        let seconds = timings
+            .iter()
+            .map(|timings| timings.untimed.map_or(timings.seconds(), |_| waited));
+        self.kernels.submitted(seconds.sum());
         if !walks.has_ended() {
             self.in_flight = Some(in_flight);
             return Ok(timings);

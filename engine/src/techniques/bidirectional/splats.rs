@@ -40,6 +40,8 @@ pub(super) struct CameraSplats {
     pub sums: Buffer,
     pub view: Viewpoint,
     pub size: [u32; 2],
+    /// Of its ray that a vertex takes in a dispatch; 1 in scenes without media.
+    pub stretches: u32,
     bounces: [u32; 2],
     /// Of the vertices of a dispatch, in scenes with media.
     rays: Option<Buffer>,
@@ -66,8 +68,9 @@ impl CameraSplats {
         let pixels = size[0] * size[1];
         let rays = || work(gpu, "splat rays", size_of::<MediumRay>(), at_once);
         let rays = scene.profile().media.any().then(rays);
+        let (sight, stretches) = SightKernel::new(gpu, scene, view, settings)?;
         Ok(Self {
-            sight: SightKernel::new(gpu, scene, view, settings)?,
+            sight,
             splat: gpu.compute_pipeline(&Default::default())?,
             add: gpu.compute_pipeline(&Default::default())?,
             splats: splats(gpu, capacity)?,
@@ -79,6 +82,7 @@ impl CameraSplats {
             )?,
             view: *view,
             size,
+            stretches,
             bounces: settings.bounces(),
             rays: rays.transpose()?,
         })
@@ -183,9 +187,11 @@ impl CameraSplats {
 }
 
 impl SightKernel {
+    /// With the stretches of its ray that a vertex takes in a dispatch.
+    ///
     /// # Errors
     /// As [`quota_of`], and those of pipelines.
-    pub fn new(gpu: &Gpu, scene: &GpuScene, view: &Viewpoint, settings: &BidirectionalSettings) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &GpuScene, view: &Viewpoint, settings: &BidirectionalSettings) -> Result<(Self, u32)> {
         let (traversal, frame) = (scene.index_traversal(), &view.frame);
         let has_lens = frame.lens_radius > 0.0 && !frame.orthographic;
         let media = scene.profile().media;
@@ -207,7 +213,7 @@ impl SightKernel {
                 index_kind: traversal.kind(),
                 ..Default::default()
             });
-            return traversal.pipeline(gpu, &spec).map(Self::Media);
+            return Ok((Self::Media(traversal.pipeline(gpu, &spec)?), stretches));
         }
         let spec = surface_spec!(bdpt_camera, scene, {
             has_multiple_scattering: scene.bsdf_features().multiple_scattering,
@@ -222,7 +228,7 @@ impl SightKernel {
             index_kind: traversal.kind(),
             ..Default::default()
         });
-        traversal.pipeline(gpu, &spec).map(Self::Surfaces)
+        Ok((Self::Surfaces(traversal.pipeline(gpu, &spec)?), 1))
     }
 
     pub fn pipeline(&self) -> PipelineInfo {

@@ -11,7 +11,6 @@
 
 use super::medium_gather::{MediumGather, Over};
 use super::settings::{Selection, VirtualLightSettings};
-use super::stopped_pace::StoppedPace;
 use crate::catalogue::{Bias, Role, Row, sources};
 use crate::gpu::interface::BindingSet;
 use crate::gpu::shaders::constants::{
@@ -27,7 +26,9 @@ use crate::gpu::{
 };
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, PathSet, surface_spec};
-use crate::walk::{ArrivalStage, Places, RAY_QUOTA, StoppedPlaces, WalkKey, stage_barrier};
+use crate::walk::{
+    ArrivalStage, Places, RAY_QUOTA, SOFTWARE_CONNECTIONS, StoppedPace, StoppedPlaces, WalkKey, stage_barrier,
+};
 use crate::{Error, Result};
 
 /// Lights that a place takes in one dispatch: enough to be worth looking the surface up again.
@@ -38,9 +39,7 @@ const QUOTA_WANTED: u32 = 256;
 const SEARCHES: u32 = 3 * INSTANCE_SEARCH_STEPS;
 /// Loop iterations that finding the potential of all lights takes at most, in the dispatch that a place begins in.
 const POTENTIAL_ITERATIONS: u32 = 1 << 15;
-/// Connections of a submission that goes on with places that have stopped, on software devices: a second or less on two cores.
-pub(super) const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
-/// The same of techniques without a pace, on devices that a driver watches.
+/// Connections of a submission of techniques without a pace, on devices that a driver watches.
 const DEVICE_CONNECTIONS: u32 = 1 << 22;
 
 /// Connections that a submission may make on a device.

@@ -160,6 +160,7 @@ pub(crate) const ROWS: &[Row] = &[Row {
         "shaders/techniques/instant_radiosity/collision_light.glsl",
         "shaders/techniques/path/path_medium.comp",
         "shaders/transport/media_tracking.glsl",
+        "shaders/walk/flight.glsl",
         "shaders/walk/medium_ray.glsl",
     ],
     bias: Some(Bias::Unbiased),

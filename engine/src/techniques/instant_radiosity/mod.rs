@@ -12,7 +12,6 @@ mod renderer;
 pub mod resampling;
 pub mod selection;
 mod settings;
-mod stopped_pace;
 
 pub(super) use card::CARD;
 pub use gather::VirtualLightCounts;

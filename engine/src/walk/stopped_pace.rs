@@ -1,17 +1,18 @@
-//! How many places that have stopped a submission of gathering goes on with.
+//! How many places that have stopped a submission of an arrival stage goes on with, each of which has some connections.
 
 use std::cell::Cell;
 
-use super::gather::SOFTWARE_CONNECTIONS;
 use crate::gpu::{DeviceKind, Pace};
 
-/// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections.
+/// Connections of a submission that goes on with places that have stopped, on software devices: a second or less on two cores.
+pub(crate) const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
+/// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections at most, 64 a place.
 const PLACES_AT_ONCE: u32 = 1 << 12;
 /// Connections that one through a grid counts as on software devices, with its place's share of the walk that finds the collision again.
 const GRID_CONNECTIONS: u32 = 8;
 
 /// As many as a driver that watches has time for, by what the last one took.
-pub(super) struct StoppedPace {
+pub(crate) struct StoppedPace {
     /// In units of [`PLACES_AT_ONCE`].
     pace: Pace,
     /// Units on software devices.
@@ -21,12 +22,12 @@ pub(super) struct StoppedPace {
 }
 
 impl StoppedPace {
-    /// For places that take so many lights in a dispatch, in a scene with or without grids.
-    pub fn new(kind: DeviceKind, lights_at_once: u32, has_grids: bool) -> Self {
+    /// For places that make so many connections in a dispatch, in a scene with or without grids.
+    pub fn new(kind: DeviceKind, connections_at_once: u32, has_grids: bool) -> Self {
         let connections = SOFTWARE_CONNECTIONS / if has_grids { GRID_CONNECTIONS } else { 1 };
         Self {
             pace: Pace::new(kind, u32::MAX / PLACES_AT_ONCE),
-            unwatched: connections / (lights_at_once * PLACES_AT_ONCE),
+            unwatched: connections / (connections_at_once * PLACES_AT_ONCE),
             recorded: Cell::new(0),
         }
     }
@@ -71,10 +72,11 @@ mod tests {
         assert_eq!(after(250 * PLACES_AT_ONCE, 1.0), 62 * PLACES_AT_ONCE);
         // Seconds for the least there is: no less is to be had.
         assert_eq!(after(PLACES_AT_ONCE, 3.0), PLACES_AT_ONCE);
-        let software =
-            |has_grids| [64, 16, 1].map(|lights| StoppedPace::new(DeviceKind::Cpu, lights, has_grids).places());
+        let software = |has_grids| {
+            [64, 16, 1].map(|connections| StoppedPace::new(DeviceKind::Cpu, connections, has_grids).places())
+        };
         assert_eq!(software(false), [1 << 13, 1 << 15, 1 << 19]);
-        // Less than the least there is, for 64 lights.
+        // Less than the least there is, for 64 connections.
         assert_eq!(software(true), [1 << 12, 1 << 12, 1 << 16]);
     }
 }
