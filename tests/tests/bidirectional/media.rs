@@ -273,10 +273,10 @@ fn each_way_to_make_a_path_in_fog_finds_the_same_light() {
         // No collision is near the lamp or the camera, where a way alone has no bound.
         let mut scene = fog_body(FORWARD);
         scene.lights.clear();
-        let reference = traced(gpu, &scene, "bounces=1", 2 * REFERENCE);
+        let reference = traced(gpu, &scene, "bounces=1", 8 * REFERENCE);
         for (strategies, samples) in [
             (Strategies::Emission, 16 * SAMPLES),
-            (Strategies::LightSamples, 2 * SAMPLES),
+            (Strategies::LightSamples, 16 * SAMPLES),
             (Strategies::Splats, 2 * SAMPLES),
         ] {
             let alone = BidirectionalSettings {
@@ -297,7 +297,7 @@ fn each_way_to_make_a_path_in_fog_finds_the_same_light() {
 fn joined_collisions_find_all_that_is_scattered_twice() {
     with_gpu(|gpu| {
         let scene = two_bodies();
-        let reference = traced(gpu, &scene, "bounces=2", 2 * REFERENCE);
+        let reference = traced(gpu, &scene, "bounces=2", 16 * REFERENCE);
         assert!(reference.mean().iter().all(|(mean, _)| *mean > 0.0));
         let alone = BidirectionalSettings {
             strategies: Strategies::Connections,
@@ -306,7 +306,7 @@ fn joined_collisions_find_all_that_is_scattered_twice() {
             most_bounces: Some(2),
             ..settings()
         };
-        passes(gpu, &scene, &alone, 2 * SAMPLES).expect_same_as(&scene.name, &reference);
+        passes(gpu, &scene, &alone, 16 * SAMPLES).expect_same_as(&scene.name, &reference);
     });
 }
 

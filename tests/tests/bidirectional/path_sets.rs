@@ -37,7 +37,7 @@ fn expressions_agree_with_the_path_tracer() {
         let coats = coated_room();
         for set in ["LDE|LGE", "L[DG]DGE|LGDE", "LS+DE"] {
             let what = format!("{}, {set}", coats.name);
-            passes(gpu, &coats, &of(set), 128).expect_same_as(&what, &traced(gpu, &coats, set, 4096));
+            passes(gpu, &coats, &of(set), 512).expect_same_as(&what, &traced(gpu, &coats, set, 16384));
         }
         let mut fog = fog_room(Phase::HenyeyGreenstein { g: 0.6 });
         add_sphere(&mut fog, "glass", DVec3::new(-0.3, -0.6, 0.3));

@@ -101,7 +101,7 @@ fn few_pixels(gpu: &Gpu, scene: &Scene, settings: &VirtualLightSettings) -> Pass
 
 /// The path tracer's picture of the same light paths.
 fn expected(gpu: &Gpu, scene: &Scene) -> Rendered {
-    render(gpu, scene, FEW, 2048, &paths(PATHS))
+    render(gpu, scene, FEW, 8192, &paths(PATHS))
 }
 
 /// Fails unless a scene has the path tracer's light, with the bound that is chosen by default.

@@ -112,6 +112,8 @@ fn frames_know_no_lengths() {
             ManyLightSettings {
                 gathering: Gathering::Disc,
                 disc_samples: 64,
+                // As wide as that of the slab's sides beside the floor.
+                disc_radius: 1.5,
                 ..rsm
             },
         ),

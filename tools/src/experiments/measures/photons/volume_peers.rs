@@ -4,6 +4,7 @@
 //! bidirectional paths, whose variance is subtracted, so that photons' bias counts; Mitsuba's are those of the spread between its pictures, which have none. Its time to our error takes the error to fall with
 //! one over time, as that of independent samples does. Scenes have no interpolated normals, so that both renderers hold the same.
 
+use std::f32::consts::PI;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -12,8 +13,9 @@ use clerestory::film::{Picture, picture};
 use clerestory::gpu::Gpu;
 use clerestory::input::read_file;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::Scene;
+use clerestory::scene::{Camera, Scene};
 use clerestory::{Error, Result, atomic, scene};
+use glam::DVec3;
 use serde_json::json;
 
 use crate::agreement::{python_of_environment, spread};
@@ -29,11 +31,20 @@ use crate::mitsuba;
 use crate::python;
 use crate::timing::{median, timed};
 
-/// What a sphere of glass, and a mirrored one, throw into fog.
-const SCENES: [&str; 2] = [
-    "builtin:fog-box?sphere=glass&boxes=none&lamp=0.1",
-    "builtin:fog-box?sphere=mirror&boxes=none&lamp=0.1",
+/// What a sphere of glass throws into the fog below it, and a mirrored one into the fog above it, with the place that is looked at, m, for the sphere itself not to be seen.
+const SCENES: [(&str, DVec3); 2] = [
+    (
+        "builtin:fog-box?sphere=glass&boxes=none&lamp=0.1",
+        DVec3::new(0.16, 0.08, 0.13),
+    ),
+    (
+        "builtin:fog-box?sphere=mirror&boxes=none&lamp=0.1",
+        DVec3::new(0.2, 0.43, 0.2),
+    ),
 ];
+/// Where it is seen from, m, and in what field of view.
+const EYE: DVec3 = DVec3::new(0.278, 0.273, -0.8);
+const FIELD_OF_VIEW: f32 = 10.0 * PI / 180.0;
 /// Pixels a side, and samples a pixel of references.
 const FULL: (u32, u32) = (32, 8192);
 const SMOKE: (u32, u32) = (8, 64);
@@ -201,9 +212,9 @@ impl Study for Found {
         let python = python_of_environment();
         atomic::write(&context.file(SCRIPT)?, SCRIPT_TEXT.as_bytes())?;
         let mut found = Self::default();
-        let name = |address: &&str| short_name(address).to_owned();
-        let rows = context.each(context.first(&SCENES, 1), name, |address| {
-            let mut of_scene = of_scene(context, &gpu, &python, address)?;
+        let name = |(address, _): &(&str, DVec3)| short_name(address).to_owned();
+        let rows = context.each(context.first(&SCENES, 1), name, |&(address, target)| {
+            let mut of_scene = of_scene(context, &gpu, &python, (address, target))?;
             found.means.append(&mut of_scene.means);
             found.left_out.append(&mut of_scene.left_out);
             Ok(of_scene.rows)
@@ -221,7 +232,7 @@ impl Study for Found {
             )
             .and(Findings::of(&self.rows, &[]))
             .note(format!(
-                "{0} × {0} pixels; {TURNS} turns, of a picture of {SECONDS} s by photons with default settings, with the preparation of the technique, and of {PICTURES} pictures of {SAMPLES} independent samples \
+                "{0} × {0} pixels of what lies beside the sphere; {TURNS} turns, of a picture of {SECONDS} s by photons with default settings, with the preparation of the technique, and of {PICTURES} pictures of {SAMPLES} independent samples \
                  a pixel by Mitsuba, without it. Ours are held against {1} samples a pixel of bidirectional paths; what Mitsuba's error would be after our time is that of one over time.",
                 FULL.0, FULL.1,
             ))
@@ -248,9 +259,11 @@ fn best(rows: &[Row]) -> Vec<Best> {
     rows.chunk_by(|a, b| a.scene == b.scene).filter_map(of_scene).collect()
 }
 
-/// A scene without interpolated normals, which renderers treat each in its own way.
-fn flat(address: &str) -> Result<Scene> {
+/// A scene without interpolated normals, which renderers treat each in its own way, with a camera that sees no sphere: what mirrors alone bring to a point and from it to the
+/// eye is in no picture, since no strategy of the reference joins it.
+fn flat(address: &str, target: DVec3) -> Result<Scene> {
     let mut scene = scene::load(address)?;
+    scene.cameras = vec![Camera::look_at("beside the sphere", EYE, target, DVec3::Y, FIELD_OF_VIEW)];
     for mesh in &mut scene.meshes {
         mesh.normals.clear();
         mesh.tangents.clear();
@@ -259,8 +272,8 @@ fn flat(address: &str) -> Result<Scene> {
 }
 
 /// All contenders in turns, and what Mitsuba is missing for. A smoke run has ours alone.
-fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, address: &str) -> Result<Found> {
-    let scene = flat(address)?;
+fn of_scene(context: &Context<'_>, gpu: &Gpu, python: &Path, (address, target): (&str, DVec3)) -> Result<Found> {
+    let scene = flat(address, target)?;
     let name = short_name(address);
     let (side, spp) = context.pick(FULL, SMOKE);
     let folder = context.folder.join(name.replace(['?', '=', '&', '.'], "-"));
