@@ -8,6 +8,7 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "maps/impostor_encode.glsl"
+#include "maps/impostor_query.glsl"
 
 // Whether one over the distance is the fourth number of a texel, instead of in a buffer of its own.
 layout(constant_id = 135) const bool IMPOSTOR_PACKED = false;
@@ -19,12 +20,7 @@ layout(push_constant, scalar) uniform Push {
     float tolerance;  // greatest residual of a surface
 } push;
 
-// A ray from the map's place, with a unit direction.
-struct ImpostorQuery {
-    vec3 origin;
-    vec3 direction;
-};
-
+// Rays from the map's place.
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { ImpostorQuery queries[]; };
 // Radiance, and one over the distance.
 layout(set = 0, binding = 1) uniform textureBuffer texels;

@@ -6,6 +6,7 @@
 layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
+#include "maps/impostor_query.glsl"
 #include "maps/impostor_set.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -13,17 +14,18 @@ layout(push_constant, scalar) uniform Push {
     float tolerance;  // greatest residual of a surface
 } push;
 
-// Three pairs of numbers a ray: where it begins, from the map's place, and its unit direction. By texels, which software drivers fetch for all lanes at once.
+// Rays from the map's place, by texels of two numbers, which software drivers fetch for all lanes at once.
 layout(set = 0, binding = 0) uniform textureBuffer queries;
 layout(set = 0, binding = 1, scalar) restrict writeonly buffer Hits { ImpostorHit hits[]; };
 
 void main() {
     uint i = invocation_index();
     if (i < push.count) {
-        int at = 3 * int(i);
-        vec2 first = texelFetch(queries, at).xy;
-        vec2 second = texelFetch(queries, at + 1).xy;
-        vec2 third = texelFetch(queries, at + 2).xy;
-        hits[i] = impostor_search(vec3(first, second.x), vec3(second.y, third), impostor_extent, push.tolerance);
+        int at = int(IMPOSTOR_QUERY_TEXELS * i);
+        ImpostorQuery query = impostor_query(
+            texelFetch(queries, at).xy,
+            texelFetch(queries, at + 1).xy,
+            texelFetch(queries, at + 2).xy);
+        hits[i] = impostor_search(query.origin, query.direction, impostor_extent, push.tolerance);
     }
 }

@@ -8,6 +8,7 @@ layout(local_size_x = 64) in;
 
 #include "invocation.glsl"
 #include "maps/impostor_encode.glsl"
+#include "maps/impostor_query.glsl"
 #include "maps/proxy.glsl"
 
 // What stands in for the surroundings; without it all is infinitely far.
@@ -25,18 +26,13 @@ layout(push_constant, scalar) uniform Push {
     vec3 up;       // unit normal of a hemisphere's ground
 } push;
 
-// A ray, with a unit direction, in the axes of the maps' places.
-struct ImpostorQuery {
-    vec3 origin;
-    vec3 direction;
-};
-
 // The direction, of any length, in which the nearest map was looked up, and the radiance of what was.
 struct ProxyHit {
     vec3 direction;
     vec3 radiance;
 };
 
+// Rays in the axes of the maps' places.
 layout(set = 0, binding = 0, scalar) restrict readonly buffer Queries { ImpostorQuery queries[]; };
 layout(set = 0, binding = 1, scalar) restrict readonly buffer Places { vec3 places[]; };
 // Map by map, each layer by layer, row by row.

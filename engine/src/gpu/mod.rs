@@ -136,5 +136,6 @@ pub use structure::{AccelerationStructure, StructureBox};
 pub use submission::Submission;
 pub use surface::{Presented, Surface};
 pub use texels::TexelView;
+pub(crate) use timing::seconds_or_waited;
 pub use timing::{Drawn, PassTiming, Timings};
 pub use wide_counter::wide_counter;

@@ -71,6 +71,14 @@ impl Timings {
     }
 }
 
+/// Seconds that submissions took, which the host has waited for together: GPU time, or, where one of them has none, what the host has waited for all of them,
+/// an upper bound.
+pub(crate) fn seconds_or_waited<'a>(submissions: impl IntoIterator<Item = &'a Timings>, waited: f64) -> f64 {
+    let times = submissions.into_iter();
+    let seconds = times.map(|timings| timings.untimed.is_none().then(|| timings.seconds()));
+    seconds.sum::<Option<f64>>().unwrap_or(waited)
+}
+
 /// Ticks from one timestamp to a later one, of which only the low `valid_bits` count: the counter may have wrapped once in between. An end
 /// that lies just before the beginning, as a device with several clocks may report it, counts as no time.
 pub(super) fn elapsed(begin: u64, end: u64, valid_bits: u32) -> u64 {
@@ -113,5 +121,28 @@ mod tests {
         let timings = Timings { passes, untimed: None };
         assert_eq!(timings.longest().map(|pass| pass.name.as_str()), Some("b"));
         assert_eq!(Timings::default().longest(), None);
+    }
+
+    #[test]
+    fn what_the_host_waited_counts_once() {
+        let pass = PassTiming {
+            name: "a".into(),
+            nanoseconds: Some(500_000_000),
+            barriers: 0,
+            invocations: None,
+            drawn: None,
+        };
+        let timed = Timings {
+            passes: vec![pass],
+            untimed: None,
+        };
+        let untimed = Timings {
+            passes: Vec::new(),
+            untimed: Some("no timestamps"),
+        };
+        assert_eq!(seconds_or_waited([&timed, &timed], 8.0), 1.0);
+        assert_eq!(seconds_or_waited([&untimed, &untimed], 8.0), 8.0);
+        assert_eq!(seconds_or_waited([&timed, &untimed, &timed], 8.0), 8.0);
+        assert_eq!(seconds_or_waited(&[], 8.0), 0.0);
     }
 }

@@ -14,19 +14,19 @@
 
 mod arrival;
 mod compaction;
+mod connection_pace;
 mod in_flight;
 mod stages;
 mod stall;
-mod stopped_pace;
 mod trace;
 mod turnover;
 mod walker;
 mod wave;
 
 pub use arrival::{ArrivalStage, Places, StoppedPlaces};
+pub(crate) use connection_pace::{ConnectionPace, SOFTWARE_CONNECTIONS};
 pub use in_flight::{Fetches, Walked, WaveInFlight};
 pub use stages::{Refill, WalkStages};
-pub(crate) use stopped_pace::{SOFTWARE_CONNECTIONS, StoppedPace};
 pub use trace::{RAY_QUOTA, ray_quota};
 pub(crate) use trace::{grid_walk_iterations, work_least};
 pub use turnover::Turnover;

@@ -28,7 +28,7 @@ pub(crate) const PASSES: u32 = 12;
 const PASS_SAMPLES_MAX: u32 = 4096;
 
 /// Size of pictures of media of such techniques.
-const FEW: [u32; 2] = [8, 8];
+const SIZE_OF_FEW_PIXELS: [u32; 2] = [8, 8];
 
 /// Samples of a picture at most, of techniques with a bias whose every sample is a frame with lights of its own for all pixels: noise is far below their tolerance then.
 const FRAMES_MAX: u32 = 96;
@@ -120,7 +120,7 @@ impl<'a> Easel<'a> {
     }
 
     /// A setting that differs from the technique's default, where it is a word.
-    pub fn word(&self, setting: &str) -> Option<&str> {
+    pub fn chosen_word(&self, setting: &str) -> Option<&str> {
         self.settings.get(setting).and_then(Value::as_str)
     }
 
@@ -129,7 +129,8 @@ impl<'a> Easel<'a> {
     /// # Errors
     /// Those of settings that cannot be read.
     pub fn size_in_media(&self) -> Result<[u32; 2]> {
-        Ok(if self.pass_samples()?.is_some() { FEW } else { SMALL })
+        let shares_noise = self.pass_samples()?.is_some();
+        Ok(if shares_noise { SIZE_OF_FEW_PIXELS } else { SMALL })
     }
 
     /// For scenes whose paths lose half of their light at each bounce: without the rare bright samples of early Russian roulette the

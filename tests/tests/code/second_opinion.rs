@@ -269,6 +269,8 @@ fn shape(place: &str, kind: &Type, theirs: &Theirs) -> Result<usize, String> {
 
 /// Parts of all kernels, a test each, which take a core each.
 const PARTS: usize = 4;
+// Each has a test below.
+const _: () = assert!(PARTS == 4);
 
 /// Checks every fourth kernel from this one on.
 fn check_part(part: usize) {

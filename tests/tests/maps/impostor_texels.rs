@@ -172,43 +172,48 @@ fn distances_beyond_a_texel_buffer_are_refused() {
     assert_no_messages(&gpu);
 }
 
-/// A map whose planes have more bytes than a storage buffer may have: a texel buffer holds them, to the last texel.
+/// A map whose planes have more bytes than a storage buffer of the baseline may have, on any device: a texel buffer holds them, to the last texel. Rounding leaves 2e-5 of a distance where the plane is
+/// seen most from aside; neighbours differ by a hundredth.
 #[test]
 fn planes_beyond_a_storage_buffers_range_are_looked_up() {
-    with_gpu(|gpu| {
-        const SIDE: u32 = 2900;
-        let map = Parametrization::OctahedronQuadratic;
-        let count = (SIDE * SIDE) as usize;
-        if gpu.caps().max_storage_buffer_range >= 16 * count as u64 {
-            return;
-        }
-        let of = |i: u32| 1.0 + (i % 97) as f32 / 97.0;
-        let distances = (0..SIDE * SIDE).map(of).collect();
-        let normals = vec![DVec3::new(0.3, 0.5, 0.8); count];
-        let image = ImpostorImage::new(map, UVec2::splat(SIDE), 1, distances, Some(&normals)).unwrap();
-        let impostor = Impostor::new(gpu, &image).unwrap();
-        assert!(impostor.bytes() > gpu.caps().max_storage_buffer_range);
-        // From the map's place along the middles of texels, to the middles of their planes.
-        let of_row = |y: u32| (0..64).map(move |i| UVec2::new(i * SIDE / 64 + 7, y));
-        let texels: Vec<UVec2> = [0, SIDE / 2, SIDE - 1].into_iter().flat_map(of_row).collect();
-        let ray = |p: &UVec2| ImpostorRay {
-            origin: DVec3::ZERO,
-            direction: map
-                .texel_direction(
-                    image.size(),
-                    Texel {
-                        layer: 0,
-                        x: p.x,
-                        y: p.y,
-                    },
-                )
-                .unwrap(),
-        };
-        let rays: Vec<ImpostorRay> = texels.iter().map(ray).collect();
-        let hits = impostor.search(&rays, &ImpostorSettings::default()).unwrap();
-        for (p, hit) in texels.iter().zip(&hits) {
-            let expected = f64::from(of(p.y * SIDE + p.x));
-            assert!((hit.distance - expected).abs() < 1e-2, "{p}: {hit:?}, not {expected}");
-        }
+    const SIDE: u32 = 2900;
+    const RANGE: u64 = 1 << 27;
+    let gpu = gpu_with(&GpuOptions {
+        lesser: Lesser {
+            max_storage_buffer_range: Some(RANGE),
+            ..Lesser::default()
+        },
+        ..GpuOptions::default()
     });
+    let map = Parametrization::OctahedronQuadratic;
+    let count = (SIDE * SIDE) as usize;
+    let of = |i: u32| 1.0 + (i % 97) as f32 / 97.0;
+    let distances = (0..SIDE * SIDE).map(of).collect();
+    let normals = vec![DVec3::new(0.3, 0.5, 0.8); count];
+    let image = ImpostorImage::new(map, UVec2::splat(SIDE), 1, distances, Some(&normals)).unwrap();
+    let impostor = Impostor::new(&gpu, &image).unwrap();
+    assert!(impostor.bytes() > RANGE);
+    // From the map's place along the middles of texels, to the middles of their planes.
+    let of_row = |y: u32| (0..64).map(move |i| UVec2::new(i * SIDE / 64 + 7, y));
+    let texels: Vec<UVec2> = [0, SIDE / 2, SIDE - 1].into_iter().flat_map(of_row).collect();
+    let ray = |p: &UVec2| ImpostorRay {
+        origin: DVec3::ZERO,
+        direction: map
+            .texel_direction(
+                image.size(),
+                Texel {
+                    layer: 0,
+                    x: p.x,
+                    y: p.y,
+                },
+            )
+            .unwrap(),
+    };
+    let rays: Vec<ImpostorRay> = texels.iter().map(ray).collect();
+    let hits = impostor.search(&rays, &ImpostorSettings::default()).unwrap();
+    for (p, hit) in texels.iter().zip(&hits) {
+        let expected = f64::from(of(p.y * SIDE + p.x));
+        assert!((hit.distance - expected).abs() < 1e-4, "{p}: {hit:?}, not {expected}");
+    }
+    assert_no_messages(&gpu);
 }

@@ -277,7 +277,7 @@ fn rays_that_are_none_find_nothing_in_the_kernel() {
         ]
         .map(|(origin, direction)| ImpostorQuery { origin, direction });
         let queries = gpu
-            .texels_with("rays", Category::Work, ImpostorSearch::RAYS, &rays)
+            .texels_with("rays", Category::Work, ImpostorSearch::RAY_FORMAT, &rays)
             .unwrap();
         let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
         let hits = gpu.buffer(&BufferDesc::storage("hits", bytes, Category::Work)).unwrap();
@@ -379,7 +379,7 @@ fn what_cannot_be_searched_is_refused_by_name() {
         // A search is made for one kind of impostor.
         let search = ImpostorSearch::new(gpu, &impostor, &settings).unwrap();
         let layered = Impostor::new(gpu, &image(2, true)).unwrap();
-        let none = gpu.texels_with("rays", Category::Work, ImpostorSearch::RAYS, &[0u32; 32]);
+        let none = gpu.texels_with("rays", Category::Work, ImpostorSearch::RAY_FORMAT, &[0u32; 32]);
         let (none, hits) = (
             none.unwrap(),
             gpu.buffer_with("hits", Category::Work, &[0u32; 32]).unwrap(),

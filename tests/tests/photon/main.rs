@@ -148,6 +148,9 @@ struct Means {
     degrees: f64,
 }
 
+/// Standard errors that a mean of a fixed seed may be off by where a test says how large they are: one right estimate in 370 is, of a normal distribution.
+const STANDARD_ERRORS: f64 = 3.0;
+
 /// Means over parts from passes of one rendering.
 fn means(gpu: &Gpu, scene: &Scene, settings: &PhotonSettings, passes: u32) -> Means {
     assert!(settings.samples_per_pass == 1 && settings.reduction == 1.0);
@@ -201,6 +204,23 @@ impl Means {
         if t > 0.0 {
             expect_mean(&what, normal_of_t(t, self.degrees), 1.0, 0.0, 0.0);
         }
+    }
+
+    /// Fails unless the first part's first channel is within [`STANDARD_ERRORS`] of what is expected, beside a relative bias, with standard errors below a share of that. Returns
+    /// the mean and its standard error.
+    fn expect_closely(&self, what: &str, expected: f64, bias: f64, most: f64) -> (f64, f64) {
+        let (mean, error) = (self.parts[0][0].value, self.parts[0][0].variance.sqrt());
+        let off = ((mean - expected).abs() - bias * expected).max(0.0);
+        let said = format!(
+            "{what}: {mean:.7} ± {error:.1e}, expected {expected:.7}, ratio {:.4} ± {:.4}, {:.2} standard errors beyond {bias:.1e}",
+            mean / expected,
+            error / expected,
+            off / error,
+        );
+        println!("{said}");
+        assert!(off < STANDARD_ERRORS * error, "{said}");
+        assert!(error < most * expected, "{said}: more than {most} of it");
+        (mean, error)
     }
 
     /// Fails unless all parts have this expectation.

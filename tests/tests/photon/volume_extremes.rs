@@ -178,7 +178,8 @@ fn scattered_twice(room: &Scene, sigma: f64, half: f64, g: f64) -> f64 {
     (0..POINTS).map(of_point).sum::<f64>() / f64::from(POINTS)
 }
 
-/// Fails unless planes, and eye paths that go on, have the light that rooms of an extinction scatter twice at last, exactly. `most`: standard error, of the light itself.
+/// Fails unless planes, and eye paths that go on, have the light that rooms of an extinction scatter twice at last, within three standard errors of a fixed seed. `most`: standard error, of the light
+/// itself.
 fn expect_scattered_twice((sigma, half, volume_radius): (f32, f64, f32), photons: u32, passes: u32, most: f64) {
     with_gpu(|gpu| {
         for g in NARROW {
@@ -194,28 +195,27 @@ fn expect_scattered_twice((sigma, half, volume_radius): (f32, f64, f32), photons
             let expected = scattered_twice(&room, f64::from(sigma), half, f64::from(g));
             let what = format!("{sigma} per metre, g {g}");
             let found = means(gpu, &room, &settings, passes);
-            found.expect(&what, 0, 0, exactly(expected), 0.0);
-            let error = found.parts[0][0].variance.sqrt() / expected;
-            assert!(error < most, "{what}: ± {error:.3} of the light");
+            found.expect_closely(&what, expected, 0.0, most);
         }
     });
 }
 
 /// Where a ray has a thousandth of a free path eye paths find next to nothing, and planes have nearly all of the light by few that lie along a ray: one standard error is about a tenth of it. The path tracer
-/// would need some hundred thousand paths for one that counts.
+/// would need some hundred thousand paths for one that counts. So the test sees that planes are there, and that their light is neither doubled nor halved; it does not see what is off by less than
+/// three tenths, nor what eye paths add.
 #[test]
 fn planes_have_what_thin_rooms_scatter_twice() {
-    expect_scattered_twice(ROOMS[0], 1 << 13, 32, 0.25);
+    expect_scattered_twice(ROOMS[0], 1 << 13, 32, 0.15);
 }
 
 #[test]
 fn planes_have_what_rooms_scatter_twice() {
-    expect_scattered_twice(ROOMS[1], 1 << 11, 24, 0.1);
+    expect_scattered_twice(ROOMS[1], 1 << 11, 96, 0.05);
 }
 
 #[test]
 fn planes_have_what_dense_rooms_scatter_twice() {
-    expect_scattered_twice(ROOMS[2], 1 << 10, 24, 0.1);
+    expect_scattered_twice(ROOMS[2], 1 << 10, 96, 0.05);
 }
 
 #[test]

@@ -8,13 +8,21 @@ use super::search::is_ray;
 use super::settings::{ImpostorSettings, ImpostorTexels};
 use super::{ImpostorHit, ImpostorImage, ImpostorRay};
 use crate::gpu::ash::vk;
-use crate::gpu::shaders::constants::{IMPOSTOR_HOLDS_DISTANCE, IMPOSTOR_HOLDS_NORMAL, IMPOSTOR_HOLDS_PLANE};
+use crate::gpu::shaders::constants::{
+    IMPOSTOR_HOLDS_DISTANCE, IMPOSTOR_HOLDS_NORMAL, IMPOSTOR_HOLDS_PLANE, IMPOSTOR_QUERY_TEXELS,
+};
 use crate::gpu::shaders::maps::impostor_search as kernel;
 use crate::gpu::shaders::sets::ImpostorSet;
 use crate::gpu::shaders::types::{ImpostorHit as DeviceHit, ImpostorQuery, ImpostorShape};
 use crate::gpu::{Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, TexelView};
 use crate::maps::is_unit;
 use crate::{Error, Result};
+
+// Rays are one type where kernels read them by texels and where they read them whole.
+const _: () = assert!(
+    size_of::<ImpostorQuery>() == 24
+        && size_of::<ImpostorQuery>() == IMPOSTOR_QUERY_TEXELS as usize * size_of::<[f32; 2]>()
+);
 
 /// An [`ImpostorImage`] in the device's memory: four bytes a texel and layer for distances alone, with normals sixteen or eight where they are kept ([`ImpostorTexels`]).
 #[derive(Debug)]
@@ -31,7 +39,7 @@ pub struct Impostor {
 
 impl Impostor {
     /// What its texels are called among buffers. They are read as texels, so that their number is bound, and not their bytes.
-    pub(crate) const TEXELS: &'static str = "impostor: texels";
+    pub(crate) const TEXELS_NAME: &'static str = "impostor: texels";
 
     /// Uploads an image, with normals as planes.
     ///
@@ -53,7 +61,7 @@ impl Impostor {
             size: image.size().as_ivec2().to_array(),
             extent: image.extent(),
         };
-        let name = Self::TEXELS;
+        let name = Self::TEXELS_NAME;
         let (planes, normals) = match texels {
             ImpostorTexels::Planes => (image.planes(), None),
             ImpostorTexels::Normals => (None, image.normals()),
@@ -159,8 +167,8 @@ pub struct ImpostorSearch {
 }
 
 impl ImpostorSearch {
-    /// The texels of rays, three a ray.
-    pub const RAYS: vk::Format = vk::Format::R32G32_SFLOAT;
+    /// The texels of rays, so many a ray that they are an [`ImpostorQuery`].
+    pub const RAY_FORMAT: vk::Format = vk::Format::R32G32_SFLOAT;
 
     /// Makes the pipeline for impostors as this one.
     ///
@@ -204,7 +212,7 @@ impl ImpostorSearch {
             return Ok((Vec::new(), 0.0));
         }
         let gpu = &impostor.gpu;
-        let queries = gpu.texels_with("impostor: rays", Category::Work, Self::RAYS, &queries)?;
+        let queries = gpu.texels_with("impostor: rays", Category::Work, Self::RAY_FORMAT, &queries)?;
         let bytes = (rays.len() * size_of::<DeviceHit>()) as u64;
         let hits = gpu.buffer(&BufferDesc::storage("impostor: hits", bytes, Category::Work))?;
         let mut recorder = gpu.recorder("impostor")?;
@@ -222,7 +230,7 @@ impl ImpostorSearch {
         Ok((hits.into_iter().map(hit).collect(), seconds))
     }
 
-    /// Records the search for `count` rays of the type [`ImpostorQuery`], which are read by texels of the format [`RAYS`](Self::RAYS), into hits of the type
+    /// Records the search for `count` rays of the type [`ImpostorQuery`], which are read by texels of the format [`RAY_FORMAT`](Self::RAY_FORMAT), into hits of the type
     /// [`DeviceHit`](crate::gpu::shaders::types::ImpostorHit), in the rays' order.
     ///
     /// Barriers: the rays must have been made visible to [`Access::COMPUTE`](crate::gpu::Access::COMPUTE), and earlier uses of the hits must have

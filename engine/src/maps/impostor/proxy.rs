@@ -72,6 +72,7 @@ pub(crate) const ROWS: &[Row] = &[
             "engine/src/maps/impostor/tests/proxies.rs::a_box_is_exact_in_its_room",
             "engine/src/maps/impostor/tests/proxies.rs::spheres_err_as_published",
             "engine/src/maps/impostor/tests/proxies.rs::proxies_behind_a_ray_and_rays_along_walls_give_finite_distances",
+            "engine/src/maps/impostor/proxy_maps.rs::shapes_beyond_single_precision_are_refused",
             "tests/tests/twins/impostors.rs::proxies_agree_with_their_twins",
             "tests/tests/maps/proxies.rs::shapes_are_looked_up_as_their_twins_say",
             "tests/tests/impostor_pictures/reflections.rs::a_box_is_exact_in_a_box",

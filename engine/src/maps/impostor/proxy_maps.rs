@@ -68,7 +68,7 @@ impl ProxyShape {
         }
     }
 
-    /// Refuses shapes that are none.
+    /// Refuses shapes that are none in single precision, in which kernels look them up: squares of their lengths are finite.
     fn check(&self) -> Result<()> {
         let wrong = |cause: &str| {
             Err(Error::setting(
@@ -77,12 +77,20 @@ impl ProxyShape {
                 cause,
             ))
         };
+        let is_radius = |radius: f64| {
+            let radius = radius as f32;
+            radius > 0.0 && (radius * radius).is_finite()
+        };
+        let is_corner = |corner: DVec3| corner.as_vec3().length_squared().is_finite();
         match *self {
-            Self::Sphere { radius } | Self::Hemisphere { radius, .. } if !(radius > 0.0 && radius.is_finite()) => {
-                wrong("has no radius above 0")
+            Self::Sphere { radius } | Self::Hemisphere { radius, .. } if !is_radius(radius) => {
+                wrong("has no radius above 0 whose square is finite in single precision")
             }
             Self::Hemisphere { up, .. } if !is_unit(up) => wrong("has a normal that is no unit vector"),
-            Self::Box { low, high } if !(low.is_finite() && high.is_finite() && low.cmplt(high).all()) => {
+            Self::Box { low, high } if !(is_corner(low) && is_corner(high)) => {
+                wrong("has a corner whose squared distance is not finite in single precision")
+            }
+            Self::Box { low, high } if !low.as_vec3().cmplt(high.as_vec3()).all() => {
                 wrong("has no corner below the other one")
             }
             _ => Ok(()),
@@ -207,4 +215,41 @@ impl ProxyMaps {
 /// The number by which the kernel knows a map: those that impostors have.
 fn looked_up(map: Parametrization) -> Option<u32> {
     kind(map).filter(|_| ImpostorImage::has_texels(map))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_beyond_single_precision_are_refused() {
+        let up = DVec3::Y;
+        let cube = |half: f64| ProxyShape::Box {
+            low: DVec3::splat(-half),
+            high: DVec3::splat(half),
+        };
+        for length in [1e-30, 1.0, 1e18] {
+            for shape in [
+                ProxyShape::Sphere { radius: length },
+                ProxyShape::Hemisphere { up, radius: length },
+                cube(length),
+            ] {
+                assert!(shape.check().is_ok(), "{shape:?}");
+            }
+        }
+        // Nothing in single precision, squares that are infinite, lengths that are, and none.
+        for length in [1e-60, 1e20, 1e39, f64::INFINITY, f64::NAN] {
+            for (shape, words) in [
+                (ProxyShape::Sphere { radius: length }, "radius"),
+                (ProxyShape::Hemisphere { up, radius: length }, "radius"),
+                (cube(length), "corner"),
+            ] {
+                let error = shape.check().unwrap_err().to_string();
+                assert!(error.contains(words), "{error}");
+            }
+        }
+        let up = DVec3::new(0.0, f64::NAN, 0.0);
+        assert!(ProxyShape::Hemisphere { up, radius: 1.0 }.check().is_err());
+        assert!(ProxyShape::None.check().is_ok());
+    }
 }

@@ -10,14 +10,14 @@ use crate::gpu::shaders::sets::{BidirectionalMediaSet, BidirectionalSet, WaveSet
 use crate::gpu::shaders::techniques::bidirectional::{bdpt_connect, bdpt_medium_connect};
 use crate::gpu::{Access, BufferView, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, TexelView};
 use crate::transport::{GpuScene, surface_spec};
-use crate::walk::{ArrivalStage, Places, StoppedPace, StoppedPlaces, WalkKey, stage_barrier};
+use crate::walk::{ArrivalStage, ConnectionPace, Places, StoppedPlaces, WalkKey, stage_barrier};
 
 /// The kernel of connections.
 pub(super) struct Connect {
     kernel: ConnectKernel,
     connections: u32,
     bounces: [u32; 2],
-    pace: StoppedPace,
+    pace: ConnectionPace,
 }
 
 enum ConnectKernel {
@@ -61,7 +61,7 @@ impl Connect {
             kernel,
             connections: settings.connections,
             bounces: settings.bounces(),
-            pace: StoppedPace::new(gpu.caps().kind, rays, media.heterogeneous),
+            pace: ConnectionPace::new(gpu.caps().kind, rays, media.heterogeneous),
         })
     }
 

@@ -22,11 +22,12 @@ use crate::gpu::shaders::techniques::bidirectional::{
 };
 use crate::gpu::shaders::types::PartialWeights;
 use crate::gpu::{
-    Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, wide_counter,
+    Access, Buffer, Category, ComputePipeline, Gpu, PipelineInfo, Recorder, TexelView, Timings, seconds_or_waited,
+    wide_counter,
 };
 use crate::transport::{GpuScene, emission_spec, surface_spec};
 use crate::walk::{
-    Bounce, StoppedPace, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds,
+    Bounce, ConnectionPace, WalkKey, WalkOptions, WalkStages, Walker, WaveBuffers, WaveInFlight, WaveNeeds,
     slots_of_device, stage_barrier,
 };
 use crate::{Error, Result};
@@ -79,8 +80,8 @@ pub(super) struct LightPaths {
     phase: Phase,
     vertices: u32,
     /// Vertices of a submission, by what those take whose rays begin; those that go on are some of these.
-    pace: StoppedPace,
-    /// And at most.
+    pace: ConnectionPace,
+    /// Vertices of a submission at most, of which each keeps its ray where there are media.
     rays_at_once: u32,
     counts: LightCounts,
 }
@@ -189,14 +190,14 @@ impl LightPaths {
             camera: None,
             phase: Phase::Before,
             vertices: 0,
-            pace: StoppedPace::new(gpu.caps().kind, 1, media.heterogeneous),
+            pace: pace_of(gpu, scene, 1),
             rays_at_once: if media.any() { MEDIA_RAYS } else { u32::MAX },
             counts: LightCounts::default(),
         };
         if settings.strategies.splats() {
             let room = (capacity, paths.rays_at_once);
             let camera = CameraSplats::new(gpu, scene, view, size, settings, room)?;
-            paths.pace = StoppedPace::new(gpu.caps().kind, camera.stretches, media.heterogeneous);
+            paths.pace = pace_of(gpu, scene, camera.stretches);
             paths.camera = Some(camera);
         }
         Ok(paths)
@@ -238,6 +239,8 @@ impl LightPaths {
         if let Some(camera) = &mut self.camera {
             (camera.sight, camera.stretches) = SightKernel::new(&self.gpu, &self.walks.scene, view, settings)?;
             camera.view = *view;
+            // What vertices took with the kernel before says nothing of this one.
+            self.pace = pace_of(&self.gpu, &self.walks.scene, camera.stretches);
         }
         Ok(())
     }
@@ -379,10 +382,9 @@ impl LightPaths {
         let clock = Instant::now();
         let mut timings = vec![recorder.submit()?.wait()?];
         if sweeps == 0 {
-            let waited = clock.elapsed().as_secs_f64();
             self.pace.record(end - shown);
             self.pace
-                .submitted(timings[0].untimed.map_or(timings[0].seconds(), |_| waited));
+                .submitted(seconds_or_waited(&timings, clock.elapsed().as_secs_f64()));
         }
         let counters = self.walks.counts.read()?;
         if counters.remaining > 0 {
@@ -535,6 +537,11 @@ impl WalkStages for LightStages<'_> {
             Ok(())
         })
     }
+}
+
+/// The pace of vertices whose rays take so many stretches in a dispatch, of which nothing is known yet.
+fn pace_of(gpu: &Gpu, scene: &GpuScene, stretches: u32) -> ConnectionPace {
+    ConnectionPace::new(gpu.caps().kind, stretches, scene.profile().media.heterogeneous)
 }
 
 fn vertex_texels(gpu: &Gpu, vertices: u32) -> Result<TexelView> {

@@ -20,7 +20,7 @@ use super::light_paths::LightPaths;
 use super::settings::BidirectionalSettings;
 use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{GpuFilm, PixelFormat, Step};
-use crate::gpu::{Buffer, Gpu, PipelineInfo, TexelView, Timings, wide_counter};
+use crate::gpu::{Buffer, Gpu, PipelineInfo, TexelView, Timings, seconds_or_waited, wide_counter};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
 use crate::techniques::path::SAMPLES_PER_WAVE;
@@ -294,10 +294,7 @@ impl BidirectionalPaths {
         let waited = clock.elapsed().as_secs_f64();
         self.counts.note(&before, walks.walked());
         let mut timings = walks.take_timings();
-        let seconds = timings
-            .iter()
-            .map(|timings| timings.untimed.map_or(timings.seconds(), |_| waited));
-        self.kernels.submitted(seconds.sum());
+        self.kernels.submitted(seconds_or_waited(&timings, waited));
         if !walks.has_ended() {
             self.in_flight = Some(in_flight);
             return Ok(timings);

@@ -14,6 +14,8 @@ const LENGTH: f64 = 1.5;
 /// Probability with which what is scattered goes on as before.
 const ONWARDS: f64 = 0.7;
 const SAMPLES: u32 = 100_000;
+/// That a mean may be off by, for a fixed seed: three bands exceed it in one right estimate of 120.
+const STANDARD_ERRORS: f64 = 3.0;
 
 /// Bands that come differently far.
 struct Rod {
@@ -157,7 +159,7 @@ fn all_ways_to_make_paths_through_fog_find_what_it_lets_through() {
         let (mean, truth) = (mean[band], truth[band]);
         assert!(error < 0.005 * truth, "band {band}: {mean} ± {error}");
         assert!(
-            (mean - truth).abs() < 5.0 * error,
+            (mean - truth).abs() < STANDARD_ERRORS * error,
             "band {band}: {mean} ± {error} instead of {truth}"
         );
     }

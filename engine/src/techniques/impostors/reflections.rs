@@ -191,7 +191,7 @@ impl ImpostorReflections {
         let has_reflector = !plan.left_out.is_empty();
         if has_reflector && plan.with_distances {
             // Not after a map that takes long.
-            gpu.caps().check_texels(Impostor::TEXELS, plan.texels())?;
+            gpu.caps().check_texels(Impostor::TEXELS_NAME, plan.texels())?;
         }
         let capture = has_reflector.then(|| Capture::new(gpu, &scene, plan)).transpose()?;
         let (path_set, eye) = (settings.path_set()?, settings.eye_paths()?);

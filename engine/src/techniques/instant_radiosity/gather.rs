@@ -27,7 +27,7 @@ use crate::gpu::{
 use crate::transport::edge_bound::EdgeBound;
 use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::walk::{
-    ArrivalStage, Places, RAY_QUOTA, SOFTWARE_CONNECTIONS, StoppedPace, StoppedPlaces, WalkKey, stage_barrier,
+    ArrivalStage, ConnectionPace, Places, RAY_QUOTA, SOFTWARE_CONNECTIONS, StoppedPlaces, WalkKey, stage_barrier,
 };
 use crate::{Error, Result};
 
@@ -78,7 +78,7 @@ pub(super) struct Gather {
     bounces: [u32; 2],
     edge_bound: EdgeBound,
     selected: Selected,
-    pace: StoppedPace,
+    pace: ConnectionPace,
 }
 
 /// By whether the scene has media.
@@ -167,7 +167,7 @@ impl Gather {
             bounces: [settings.least_bounces, settings.most().unwrap_or(u32::MAX)],
             edge_bound,
             selected,
-            pace: StoppedPace::new(gpu.caps().kind, lights_at_once, scene.profile().media.heterogeneous),
+            pace: ConnectionPace::new(gpu.caps().kind, lights_at_once, scene.profile().media.heterogeneous),
         })
     }
 

@@ -29,7 +29,7 @@ use crate::film::picture::{NonFiniteSamples, Picture};
 use crate::film::{PixelFormat, Step};
 use crate::gpu::shaders::constants::VIRTUAL_LIGHT_QUARTERS;
 use crate::gpu::shaders::types::SceneLightNode;
-use crate::gpu::{Buffer, Gpu, PipelineInfo};
+use crate::gpu::{Buffer, Gpu, PipelineInfo, seconds_or_waited};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
 use crate::techniques::path::PathCounters;
@@ -334,8 +334,7 @@ impl VirtualLights {
         let waited = clock.elapsed().as_secs_f64();
         if let Some(lights) = &mut self.lights {
             let timings = step.iter().flat_map(|step| &step.timings);
-            let seconds = timings.map(|timings| timings.untimed.map_or(timings.seconds(), |_| waited));
-            lights.gather.submitted(seconds.sum());
+            lights.gather.submitted(seconds_or_waited(timings, waited));
             // They are those of a whole wave.
             if gathers && step.is_some() && !self.eye.is_within_wave() {
                 let counts = lights.gather.counts()?;

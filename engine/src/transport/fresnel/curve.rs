@@ -171,7 +171,7 @@ impl FresnelCurve {
         self.run_between(gpu, count, ALL_COSINES)
     }
 
-    /// The results of as many invocations as there are cosines, which need not be even: a dispatch for each of them.
+    /// One value for each cosine, by a dispatch of its own: cosines need not be evenly spaced.
     ///
     /// # Errors
     /// As [`FresnelCurve::run`].

@@ -85,7 +85,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     let of_planes = easel
         .with("volume_radius", RADIUS)
         .with("samples_per_pass", SAMPLES / PASSES);
-    let easel = match easel.word("volume") {
+    let easel = match easel.chosen_word("volume") {
         Some("planes") => &of_planes,
         _ => easel,
     };

@@ -83,7 +83,7 @@ fn judge(easel: &Easel<'_>) -> Result<Judgement> {
     }
     furnace.cameras = vec![camera_down(SEEN, 1.0)];
     let wide = easel.with("volume_radius", RADIUS);
-    let (easel, samples, documented) = match easel.word("volume") {
+    let (easel, samples, documented) = match easel.chosen_word("volume") {
         _ if !easel.has("volume_radius") => (easel, SAMPLES, 0.0),
         Some("march") => (easel, SAMPLES, SCATTERED_AGAIN),
         Some("planes") => (easel, SAMPLES_OF_PLANES, HALF_OF_IT),

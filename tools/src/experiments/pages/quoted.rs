@@ -91,6 +91,7 @@ fn fill_all(kind: &Kind, root: &Path, text: &str, link: &str) -> Result<String> 
 
 #[cfg(test)]
 mod tests {
+    use super::super::stored::{FILE, Run};
     use super::*;
 
     #[test]
@@ -123,25 +124,35 @@ mod tests {
             not_run.contains("](results/fresnel-cost/README.md): not run\n"),
             "{not_run}"
         );
-        let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let results = repository.join(super::super::FOLDER);
+        let row = |form: &str, error: f64| {
+            serde_json::json!({
+                "form": form, "time": [2.0, 2.0], "share": [50.0, 50.0], "published": null, "error": error, "over_faster": null,
+            })
+        };
+        let stored = Stored {
+            run: Run::begin("clerestory report fresnel-cost".into()),
+            found: serde_json::json!([row("exact", 0.0), row("rescaled-f0", 12.5)]),
+        };
+        let experiment = root.join("fresnel-cost");
+        std::fs::create_dir(&experiment).unwrap();
+        std::fs::write(experiment.join(FILE), stored.text().unwrap()).unwrap();
         let error = "greatest error for the tabulated metals (%)";
-        let filled = fill(&results, &block(&format!("{error} | form")), "results").unwrap();
+        let filled = fill(root, &block(&format!("{error} | form")), "results").unwrap();
         let heads = format!(" -->\n\n| {error} | form |\n|---");
         assert!(
             filled.starts_with("a\n<!-- table: fresnel-cost") && filled.contains(&heads),
             "{filled}"
         );
         assert!(
-            filled.contains("| rescaled-f0 |\n") && !filled.contains("old"),
+            filled.contains("| 12.50 | rescaled-f0 |\n") && !filled.contains("old"),
             "{filled}"
         );
         assert!(filled.ends_with("|\n\n<!-- end of table -->\nb\n"), "{filled}");
-        assert_eq!(fill(&results, &filled, "results").unwrap(), filled);
+        assert_eq!(fill(root, &filled, "results").unwrap(), filled);
         for wrong in ["form | no such column", ""] {
-            let error = fill(&results, &block(wrong), "results").unwrap_err().to_string();
+            let error = fill(root, &block(wrong), "results").unwrap_err().to_string();
             assert!(error.contains("columns"), "{wrong}: {error}");
         }
-        assert!(fill(&results, "<!-- table: fresnel-cost | form -->", "results").is_err());
+        assert!(fill(root, "<!-- table: fresnel-cost | form -->", "results").is_err());
     }
 }

@@ -525,7 +525,7 @@ const ROWS: &[Row] = &[
         id: "SVO-B0",
         name: "shadow maps of virtual lights, exact ones of all triangles",
         role: Role::PartOf("SVO-P12"),
-        limits: "An octahedron of all directions for each light, of which its surface hides one half, where paraboloids and half octahedra have one texel for two; costs as lights times triangles; contact shadows begin a texel's diagonal late; alpha and glass are opaque to maps: partial alpha is refused, and cut-outs are seen through in exact maps alone.",
+        limits: "An octahedron of all directions for each light, of which its surface hides one half, where paraboloids and half octahedra have one texel for two; costs as lights times triangles; contact shadows begin a texel's diagonal late; glass is opaque, and partial alpha is refused; cut-outs are seen through in exact maps, and are opaque in imperfect ones alone.",
         sources: &[
             sources::ENGELHARDT_DACHSBACHER_2008.whole(),
             sources::SUN_2015.at("§1 and §6"),

@@ -214,6 +214,7 @@ pub(crate) const ROWS: &[Row] = &[
         tests: &[
             "engine/src/techniques/photon_mapping/volume/event.rs::beams_have_the_airlight_integral",
             "tests/tests/photon/volume.rs::beams_have_the_six_constants",
+            "tests/tests/photon/volume.rs::beams_have_the_airlight_constant_to_a_hundredth",
             "tests/tests/photon/volume.rs::fog_agrees_with_the_path_tracer",
             "tests/tests/photon/volume_kernels.rs::beams_have_no_kernels_of_their_own",
             "tests/tests/photon/volume_queues.rs::beams_are_the_same_in_every_form_on_any_number_of_threads",

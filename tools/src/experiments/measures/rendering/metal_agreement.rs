@@ -9,7 +9,7 @@ use crate::agreement::{AgreementOptions, AgreementReport, mitsuba_version, run_w
 use crate::experiments::findings::{Findings, Study};
 use crate::experiments::measures::Context;
 
-/// Scenes by name: smooth and rough metals of GGX, a rough one of Beckmann's distribution, and a white one that must vanish.
+/// Scenes by name: smooth and rough metals of GGX, a rough one of Beckmann's distribution, and a white one, which loses what it would scatter more than once: Mitsuba's conductors scatter once, and so do ours here.
 const SCENES: [&str; 3] = ["cornell-metals", "cornell-beckmann", "furnace-metal"];
 const SMOKE_SCENES: usize = 1;
 const SMOKE_SIZE: u32 = 16;

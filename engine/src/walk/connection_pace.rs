@@ -1,18 +1,18 @@
-//! How many places that have stopped a submission of an arrival stage goes on with, each of which has some connections.
+//! How many places a submission makes connections for: those that have stopped, with which an arrival stage goes on, or vertices that are shown to the camera.
 
 use std::cell::Cell;
 
 use crate::gpu::{DeviceKind, Pace};
 
-/// Connections of a submission that goes on with places that have stopped, on software devices: a second or less on two cores.
+/// Connections of such a submission on software devices: a second or less on two cores.
 pub(crate) const SOFTWARE_CONNECTIONS: u32 = 1 << 19;
-/// Places that such a submission has at least, and the first one on devices that a driver watches: 2¹⁸ connections at most, 64 a place.
+/// Places that it has at least, and the first one on devices that a driver watches: 2¹⁸ connections at most, 64 a place.
 const PLACES_AT_ONCE: u32 = 1 << 12;
 /// Connections that one through a grid counts as on software devices, with its place's share of the walk that finds the collision again.
 const GRID_CONNECTIONS: u32 = 8;
 
 /// As many as a driver that watches has time for, by what the last one took.
-pub(crate) struct StoppedPace {
+pub(crate) struct ConnectionPace {
     /// In units of [`PLACES_AT_ONCE`].
     pace: Pace,
     /// Units on software devices.
@@ -21,7 +21,7 @@ pub(crate) struct StoppedPace {
     recorded: Cell<u32>,
 }
 
-impl StoppedPace {
+impl ConnectionPace {
     /// For places that make so many connections in a dispatch, in a scene with or without grids.
     pub fn new(kind: DeviceKind, connections_at_once: u32, has_grids: bool) -> Self {
         let connections = SOFTWARE_CONNECTIONS / if has_grids { GRID_CONNECTIONS } else { 1 };
@@ -42,7 +42,7 @@ impl StoppedPace {
         self.recorded.set(places);
     }
 
-    /// A submission took so long, whether it went on with such places or not.
+    /// A submission took so long, whether it had such places or not.
     pub fn submitted(&mut self, seconds: f64) {
         let places = self.recorded.take();
         if places > 0 {
@@ -56,8 +56,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_that_go_on_are_as_many_as_a_driver_has_time_for() {
-        let mut pace = StoppedPace::new(DeviceKind::Discrete, 64, false);
+    fn places_of_a_submission_are_as_many_as_a_driver_has_time_for() {
+        let mut pace = ConnectionPace::new(DeviceKind::Discrete, 64, false);
         assert_eq!(pace.places(), PLACES_AT_ONCE);
         // A submission of other stages says nothing of the pace of this one.
         pace.submitted(1.0);
@@ -73,7 +73,7 @@ mod tests {
         // Seconds for the least there is: no less is to be had.
         assert_eq!(after(PLACES_AT_ONCE, 3.0), PLACES_AT_ONCE);
         let software = |has_grids| {
-            [64, 16, 1].map(|connections| StoppedPace::new(DeviceKind::Cpu, connections, has_grids).places())
+            [64, 16, 1].map(|connections| ConnectionPace::new(DeviceKind::Cpu, connections, has_grids).places())
         };
         assert_eq!(software(false), [1 << 13, 1 << 15, 1 << 19]);
         // Less than the least there is, for 64 connections.
