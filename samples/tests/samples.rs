@@ -334,7 +334,7 @@ fn the_viewer_goes_through_the_techniques() {
     // What cannot render the scene is left out: of media, all but the path tracer, bidirectional paths, photon mapping and virtual lights.
     for (keys, technique) in [("t", "bdpt, "), ("tt", "photon, "), ("ttt", "vpl, "), ("tttt", "path, ")] {
         let (_, text) = shown(&["builtin:fog-box", "--keys", keys]);
-        assert!(text.contains(technique), "{text}");
+        assert!(text.contains(technique), "{keys}: {text}");
     }
 }
 

