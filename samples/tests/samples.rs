@@ -332,7 +332,12 @@ fn the_viewer_goes_through_the_techniques() {
     let (_, text) = shown(&[lit, "--technique", "many-light", "--keys", "t"]);
     assert!(text.contains("path, "), "{text}");
     // What cannot render the scene is left out: of media, all but the path tracer, bidirectional paths, photon mapping and virtual lights.
-    for (keys, technique) in [("t", "bdpt, "), ("tt", "photon, "), ("ttt", "vpl, "), ("tttt", "path, ")] {
+    for (keys, technique) in [
+        ("t", "photon, "),
+        ("tt", "vpl, "),
+        ("ttt", "bdpt, "),
+        ("tttt", "path, "),
+    ] {
         let (_, text) = shown(&["builtin:fog-box", "--keys", keys]);
         assert!(text.contains(technique), "{keys}: {text}");
     }

@@ -234,7 +234,10 @@ fn a_black_reference_is_refused() -> Tested {
     let bench = Bench::new()?;
     let output = bench.run(&TEXT.replace("size =", "path_set = \"LVE\"\nsize ="), &[])?;
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(!output.status.success() && said.contains("the picture is black"), "{said}");
+    assert!(
+        !output.status.success() && said.contains("the picture is black"),
+        "{said}"
+    );
     assert!(!bench.folder.path().join("references").exists());
     Ok(())
 }

@@ -237,7 +237,13 @@ impl Running<'_> {
         let Some(rendered) = self.render(stage, &options)? else {
             return Ok(None);
         };
-        if rendered.picture.main_layer()?.values().iter().all(|&value| value == 0.0) {
+        if rendered
+            .picture
+            .main_layer()?
+            .values()
+            .iter()
+            .all(|&value| value == 0.0)
+        {
             return Err(Error::setting(
                 "reference",
                 &what,

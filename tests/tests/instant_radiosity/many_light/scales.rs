@@ -57,7 +57,10 @@ fn expect_no_lengths(what: &str, noise: f64, picture: impl Fn(&Scene, f32) -> Ve
         let off = mean(&found, 1) / whole - 1.0;
         println!("{what} times {scale}: {differ} differ, the mean is off by {off:.1e}");
         let is_same = if noise > 0.0 { off.abs() < noise } else { differ == 0 };
-        assert!(is_same, "{what} times {scale}: {differ} differ, the mean is off by {off:.1e}");
+        assert!(
+            is_same,
+            "{what} times {scale}: {differ} differ, the mean is off by {off:.1e}"
+        );
     }
     let off = mean(&picture(&hall_at(1.0, FAR), 1.0), 1) / whole - 1.0;
     println!("{what}: off by {off:.1e} far from the origin");

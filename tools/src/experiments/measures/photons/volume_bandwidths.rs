@@ -15,7 +15,9 @@ use clerestory::{Result, scene};
 use super::cases::mapper;
 use super::scenarios::{Depths, SCENARIOS, Scenario, TWO_BOUNCES, by_name};
 use crate::agreement::spread;
-use crate::experiments::findings::{Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows};
+use crate::experiments::findings::{
+    Bound, Criterion, Findings, Measured, Repeats, Study, change, geometric_mean, rows,
+};
 use crate::experiments::measures::Context;
 use crate::experiments::measures::maps::sphere::sheet;
 use crate::experiments::measures::pictures::{finished, mean_of, mean_picture};

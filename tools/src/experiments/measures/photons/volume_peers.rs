@@ -263,7 +263,13 @@ fn best(rows: &[Row]) -> Vec<Best> {
 /// eye is in no picture, since no strategy of the reference joins it.
 fn flat(address: &str, target: DVec3) -> Result<Scene> {
     let mut scene = scene::load(address)?;
-    scene.cameras = vec![Camera::look_at("beside the sphere", EYE, target, DVec3::Y, FIELD_OF_VIEW)];
+    scene.cameras = vec![Camera::look_at(
+        "beside the sphere",
+        EYE,
+        target,
+        DVec3::Y,
+        FIELD_OF_VIEW,
+    )];
     for mesh in &mut scene.meshes {
         mesh.normals.clear();
         mesh.tangents.clear();
