@@ -178,9 +178,15 @@ fn scattered_twice(room: &Scene, sigma: f64, half: f64, g: f64) -> f64 {
     (0..POINTS).map(of_point).sum::<f64>() / f64::from(POINTS)
 }
 
-/// Fails unless planes, and eye paths that go on, have the light that rooms of an extinction scatter twice at last, within three standard errors of a fixed seed. `most`: standard error, of the light
+/// Fails unless planes, and eye paths that go on, have the light that rooms of an extinction scatter twice at last, within three standard errors of a fixed seed. `bias`: what few passes may lack besides; `most`: standard error; both of the light
 /// itself. Narrower phase functions leave it to rare spikes, more so the denser the medium (`media-narrow-phase` of docs/stability.md): `planes.rs` has these where a picture of few passes can tell.
-fn expect_scattered_twice((sigma, half, volume_radius): (f32, f64, f32), photons: u32, passes: u32, most: f64) {
+fn expect_scattered_twice(
+    (sigma, half, volume_radius): (f32, f64, f32),
+    photons: u32,
+    passes: u32,
+    bias: f64,
+    most: f64,
+) {
     with_gpu(|gpu| {
         for g in [-0.5, 0.5] {
             let room = room(sigma, half, g);
@@ -195,7 +201,7 @@ fn expect_scattered_twice((sigma, half, volume_radius): (f32, f64, f32), photons
             let expected = scattered_twice(&room, f64::from(sigma), half, f64::from(g));
             let what = format!("{sigma} per metre, g {g}");
             let found = means(gpu, &room, &settings, passes);
-            found.expect_closely(&what, expected, 0.0, most);
+            found.expect_closely(&what, expected, bias, most);
         }
     });
 }
@@ -205,18 +211,18 @@ fn expect_scattered_twice((sigma, half, volume_radius): (f32, f64, f32), photons
 /// seven tenths, nor what eye paths add.
 #[test]
 fn planes_have_what_thin_rooms_scatter_twice() {
-    expect_scattered_twice(ROOMS[0], 1 << 12, 12, 0.3);
+    expect_scattered_twice(ROOMS[0], 1 << 12, 12, 0.0, 0.3);
 }
 
 #[test]
 fn planes_have_what_rooms_scatter_twice() {
-    expect_scattered_twice(ROOMS[1], 1 << 11, 24, 0.1);
+    expect_scattered_twice(ROOMS[1], 1 << 11, 24, 0.0, 0.1);
 }
 
-/// Of a thousand free paths a few planes have most of the light: this sees that they are there, and no more.
+/// Across a thousand free paths a few planes have much of the light, so that pictures of few passes are darker than their spread tells: this sees that planes are there, and no more.
 #[test]
 fn planes_have_what_dense_rooms_scatter_twice() {
-    expect_scattered_twice(ROOMS[2], 1 << 10, 24, 0.5);
+    expect_scattered_twice(ROOMS[2], 1 << 10, 24, 0.3, 0.5);
 }
 
 #[test]
