@@ -6,6 +6,7 @@
 
 pub mod child;
 pub mod driver;
+pub mod fog;
 pub mod render;
 pub mod shaders;
 pub mod statistics;

@@ -3,10 +3,11 @@
 use super::*;
 use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::scene::{Camera, DensityGrid, Environment, Medium, Phase};
+use clerestory::scene::{Camera, Environment, Medium, Phase};
 use clerestory::techniques::bidirectional::BidirectionalCounts;
 use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
 use clerestory_tests::child::{hash_in_child, print_hash};
+use clerestory_tests::fog::{add_boundary, fog, uneven_density};
 use clerestory_tests::gpu;
 use clerestory_tests::render::{camera_aslant, floor};
 
@@ -17,16 +18,6 @@ const SAMPLES: u32 = 128;
 const REFERENCE: u32 = 1024;
 const FORWARD: Phase = Phase::HenyeyGreenstein { g: 0.6 };
 
-/// A medium whose bands come differently far.
-fn fog(phase: Phase) -> Medium {
-    Medium {
-        sigma_s: Vec3::new(0.4, 0.6, 0.9),
-        sigma_a: Vec3::new(0.2, 0.1, 0.05),
-        phase,
-        ..Medium::default()
-    }
-}
-
 /// The room with a lamp, filled with it.
 pub(super) fn fog_room(phase: Phase) -> Scene {
     let mut scene = room();
@@ -35,21 +26,6 @@ pub(super) fn fog_room(phase: Phase) -> Scene {
     scene.media.push(fog(phase));
     scene.surrounding = Some(0);
     scene
-}
-
-/// Adds a medium three to four times as dense, and the material of an invisible boundary around it.
-fn add_boundary(scene: &mut Scene, phase: Phase) -> u32 {
-    let interior = scene.media.len() as u32;
-    scene.media.push(Medium {
-        sigma_s: Vec3::new(2.0, 3.0, 4.0),
-        ..fog(phase)
-    });
-    scene.add_material(Material {
-        name: "boundary".into(),
-        boundary: true,
-        interior: Some(interior),
-        ..Material::default()
-    })
 }
 
 /// The room with a lamp and a point light, and a body of a denser medium behind an invisible boundary.
@@ -111,9 +87,7 @@ fn two_bodies() -> Scene {
 pub(super) fn cloud(around: bool) -> Scene {
     let mut scene = fog_body(FORWARD);
     scene.name = format!("cloud, in fog: {around}");
-    let density = |p: DVec3| (2.0 * p.x * (0.5 + 0.5 * (7.0 * p.y).sin()) + 0.3 * p.z) as f32;
-    let grid = DensityGrid::from_fn([8, 12, 6], density);
-    scene.media[0].density = Some(grid.in_box(DVec3::new(-0.2, -0.8, -0.7), DVec3::new(0.6, 0.1, 0.3)));
+    scene.media[0].density = Some(uneven_density(DVec3::new(-0.2, -0.8, -0.7), DVec3::new(0.6, 0.1, 0.3)));
     if around {
         scene.media.push(fog(Phase::Isotropic));
         scene.surrounding = Some(1);

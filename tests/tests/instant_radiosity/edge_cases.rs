@@ -1,7 +1,6 @@
 //! Sizes, shares of work, scenes that have nothing, and what is refused.
 
 use super::*;
-use clerestory::Error;
 use clerestory::gpu::{GpuOptions, Lesser};
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::Environment;
@@ -236,23 +235,7 @@ fn lights_beyond_a_buffer_are_refused_with_their_number() {
         ..settings()
     };
     let mut renderer = renderer(&gpu, &room(), [1, 1], &many);
-    let error = loop {
-        match renderer.step(1) {
-            Ok(Some(_)) => {}
-            Ok(None) => panic!("must be refused"),
-            Err(error) => break error,
-        }
-    };
-    let text = error.to_string();
-    let Error::Overflow {
-        kernel,
-        needed,
-        capacity,
-        ..
-    } = error
-    else {
-        panic!("{text}");
-    };
+    let (text, kernel, needed, capacity) = overflow_of(&mut renderer);
     assert_eq!((kernel.as_str(), capacity), ("vpl_append", RANGE / BYTES));
     // One of each walk, in a closed room.
     assert_eq!(needed, u64::from(WALKS), "{text}");

@@ -15,6 +15,7 @@ mod walks;
 
 use std::f64::consts::PI;
 
+use clerestory::Error;
 use clerestory::film::z_test::{SIGNIFICANCE, z_test};
 use clerestory::gpu::Gpu;
 use clerestory::scene::{LightKind, Material, Scene};
@@ -119,6 +120,27 @@ impl Passes {
             let what = format!("{what}, channel {channel}");
             expect_mean_of(&what, &self.means[channel], expected, variance.sqrt(), bias * expected);
         }
+    }
+}
+
+/// The overflow that a renderer ends with: what it says, the kernel, and the records that are needed and those that there is room for.
+fn overflow_of(renderer: &mut VirtualLights) -> (String, String, u64, u64) {
+    let error = loop {
+        match renderer.step(1) {
+            Ok(Some(_)) => {}
+            Ok(None) => panic!("must be refused"),
+            Err(error) => break error,
+        }
+    };
+    let text = error.to_string();
+    match error {
+        Error::Overflow {
+            kernel,
+            needed,
+            capacity,
+            ..
+        } => (text, kernel, needed, capacity),
+        _ => panic!("{text}"),
     }
 }
 

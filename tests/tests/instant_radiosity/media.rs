@@ -1,26 +1,16 @@
 //! Scenes with media: virtual lights at collisions, and eye paths that gather at theirs.
 
 use super::*;
-use clerestory::Error;
 use clerestory::render::{RenderOptions, Renderer};
 use clerestory::scene::{DensityGrid, Environment, Medium, Phase};
 use clerestory_tests::child::{hash_in_child, print_hash};
+use clerestory_tests::fog::{add_boundary, fog, uneven_density};
 use clerestory_tests::gpu;
 use glam::DVec3;
 
 /// Set in the processes that only print their picture's hash.
 const CHILD: &str = "CLERESTORY_TEST_PRINT_HASH_OF_FOG";
 const CHILD_TEST: &str = "media::prints_its_hash_when_asked";
-
-/// A medium whose bands come differently far.
-fn fog(phase: Phase) -> Medium {
-    Medium {
-        sigma_s: Vec3::new(0.4, 0.6, 0.9),
-        sigma_a: Vec3::new(0.2, 0.1, 0.05),
-        phase,
-        ..Medium::default()
-    }
-}
 
 /// The room, filled with it.
 fn fog_room(phase: Phase) -> Scene {
@@ -35,16 +25,7 @@ fn fog_room(phase: Phase) -> Scene {
 fn fog_body(phase: Phase) -> Scene {
     let mut scene = room();
     scene.name = format!("body of fog with {phase:?}");
-    scene.media.push(Medium {
-        sigma_s: Vec3::new(2.0, 3.0, 4.0),
-        ..fog(phase)
-    });
-    let boundary = scene.add_material(Material {
-        name: "boundary".into(),
-        boundary: true,
-        interior: Some(0),
-        ..Material::default()
-    });
+    let boundary = add_boundary(&mut scene, phase);
     scene.place(cuboid(
         "fog",
         boundary,
@@ -58,9 +39,7 @@ fn fog_body(phase: Phase) -> Scene {
 fn cloud(around: bool) -> Scene {
     let mut scene = fog_body(Phase::HenyeyGreenstein { g: 0.6 });
     scene.name = format!("cloud, in fog: {around}");
-    let density = |p: DVec3| (2.0 * p.x * (0.5 + 0.5 * (7.0 * p.y).sin()) + 0.3 * p.z) as f32;
-    let grid = DensityGrid::from_fn([8, 12, 6], density);
-    scene.media[0].density = Some(grid.in_box(DVec3::new(-0.2, -0.8, -0.7), DVec3::new(0.6, 0.2, 0.3)));
+    scene.media[0].density = Some(uneven_density(DVec3::new(-0.2, -0.8, -0.7), DVec3::new(0.6, 0.2, 0.3)));
     if around {
         scene.media.push(fog(Phase::Isotropic));
         scene.surrounding = Some(1);

@@ -1,7 +1,6 @@
 //! Lights that places choose: by cuts through a tree of them, and by their potential.
 
 use super::*;
-use clerestory::Error;
 use clerestory::gpu::shaders::constants::LIGHT_NODE_LEAF;
 use clerestory::gpu::shaders::types::SceneLightNode;
 use clerestory::gpu::{GpuOptions, Lesser};
@@ -538,23 +537,7 @@ fn trees_beyond_a_buffer_are_refused_with_their_size() {
         ..cuts(4)
     };
     let mut renderer = renderer(&gpu, &room(), [1, 1], &many);
-    let error = loop {
-        match renderer.step(1) {
-            Ok(Some(_)) => {}
-            Ok(None) => panic!("must be refused"),
-            Err(error) => break error,
-        }
-    };
-    let text = error.to_string();
-    let Error::Overflow {
-        kernel,
-        needed,
-        capacity,
-        ..
-    } = error
-    else {
-        panic!("{text}");
-    };
+    let (text, kernel, needed, capacity) = overflow_of(&mut renderer);
     assert_eq!((kernel.as_str(), capacity), ("cut_level", RANGE / 64));
     assert!(needed > capacity && text.contains("walks"), "{text}");
     assert_no_messages(&gpu);

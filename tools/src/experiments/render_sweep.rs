@@ -226,30 +226,19 @@ impl Running<'_> {
             engine: ENGINE,
         };
         let (key, path) = (identity.key()?, identity.path(&self.places.references, stage.address)?);
+        let what = format!("{}: reference, {} spp", stage.address, plan.spp);
         if !self.places.fresh
             && let Some(picture) = reference::kept(&path)?
         {
+            refuse_black(&what, &picture)?;
             return Ok(Some((path, key, picture)));
         }
-        let what = format!("{}: reference, {} spp", stage.address, plan.spp);
         self.watch.begin(&what, self.measured + self.found, self.all);
         let options = self.options(&plan.technique, &settings, Budget::Spp(plan.spp), reference::SEED);
         let Some(rendered) = self.render(stage, &options)? else {
             return Ok(None);
         };
-        if rendered
-            .picture
-            .main_layer()?
-            .values()
-            .iter()
-            .all(|&value| value == 0.0)
-        {
-            return Err(Error::setting(
-                "reference",
-                &what,
-                "the picture is black, so that no error relative to it exists: take more samples or a brighter scene",
-            ));
-        }
+        refuse_black(&what, &rendered.picture)?;
         let picture = reference::keep(&path, &key, &rendered)?;
         Ok(Some((path, key, picture)))
     }
@@ -388,6 +377,18 @@ fn keep_picture(path: &Path, picture: &Picture) -> Result<()> {
     kept.metadata = picture.metadata.clone();
     kept.add_layer(RADIANCE, 3, picture.main_layer()?.pixels().flatten().collect())?;
     exr::write(path, &kept)
+}
+
+/// Refuses a reference that no error is relative to.
+fn refuse_black(what: &str, picture: &Picture) -> Result<()> {
+    if picture.main_layer()?.values().iter().any(|&value| value != 0.0) {
+        return Ok(());
+    }
+    Err(Error::setting(
+        "reference",
+        what,
+        "the picture is black, so that no error relative to it exists: take more samples or a brighter scene",
+    ))
 }
 
 fn judge(rendered: &Rendered, reference: &Picture, task: &Task, budget: Budget, tone: ToneMap) -> Result<Measurement> {
