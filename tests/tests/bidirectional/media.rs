@@ -321,10 +321,10 @@ fn caustics_of_a_tiny_lamp_in_fog_are_those_of_photons() {
 #[test]
 fn pictures_of_media_do_not_depend_on_how_the_work_is_cut_up() {
     with_gpu(|gpu| {
-        for (scene, set) in [
-            (fog_body(Phase::Isotropic), "all"),
+        for (scene, set, parts) in [
+            (fog_body(Phase::Isotropic), "all", [(64, 0, 0), (0, 1, 0)]),
             // By states.
-            (cloud(true), "LVE|LDVE|LVDE"),
+            (cloud(true), "LVE|LDVE|LVDE", [(64, 64, 0), (0, 0, 3)]),
         ] {
             // Pixels that fill no workgroup.
             let base = BidirectionalSettings {
@@ -349,7 +349,7 @@ fn pictures_of_media_do_not_depend_on_how_the_work_is_cut_up() {
             };
             let (whole, counts) = of(&base);
             assert!(done(&counts).iter().all(|count| *count > 100), "{counts:?}");
-            for (paths_in_flight, submission_work, ray_quota) in [(64, 0, 0), (0, 1, 0), (64, 64, 0), (0, 0, 3)] {
+            for (paths_in_flight, submission_work, ray_quota) in parts {
                 let settings = BidirectionalSettings {
                     paths_in_flight,
                     submission_work,

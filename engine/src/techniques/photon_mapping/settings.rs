@@ -170,7 +170,9 @@ crate::settings! {
         /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
         /// From which size on kernels in media that follow footprints grow slower, by a logarithm, in unit lengths; 0 leaves them as they are.
-        pub volume_dampening: f32 = 3.0, in 0.0..;
+        ///
+        /// By the default, two ninths of the scene's diagonal, rays meet about as many kernels as by 85 neighbours; sizes in metres do not carry over from scene to scene.
+        pub volume_dampening: f32 = 2.0, in 0.0..;
         /// Eye paths go on behind their first scattering in a medium, and share the light that they find there with photons, each weighted by what the others have of it; for
         /// `unified` and `planes` alone, and not with final_gather.
         ///

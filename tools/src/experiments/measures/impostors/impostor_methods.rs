@@ -31,7 +31,7 @@ const TEXELS: f64 = 6.0 * 256.0 * 256.0;
 const TURNS: usize = 5;
 /// Of look-ups with their radiance, whose times are compared: pixels along a side of the view, and turns.
 const TIMED_SIDE: u32 = 660;
-const TIMED_TURNS: usize = 9;
+const TIMED_TURNS: usize = 25;
 /// Index of glass.
 const GLASS: f64 = 1.5;
 

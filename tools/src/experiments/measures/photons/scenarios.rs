@@ -1,7 +1,8 @@
 //! The source's nine scenes of photons in media: light, medium and settings as it has them, and what it found there.
 //!
-//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.3.4, Tables 7.1 to 7.3. Scenes are stand-ins of the same size, whose
-//! addresses have its coefficients as parameters; how high fog stands in the courtyard, and how uneven it is, is ours.
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.3.4, Tables 7.1 to 7.3. Scenes are stand-ins of about the same size, whose
+//! addresses have its coefficients as parameters; how high fog stands in the courtyard, and how uneven it is, is ours. Its dampening was chosen by eye for its scenes, in metres; here it is the
+//! default, a share of each scene's diagonal, unless a caller asks for the source's.
 
 use clerestory::Result;
 use clerestory::techniques::photon_mapping::PhotonSettings;
@@ -12,7 +13,7 @@ use clerestory::techniques::photon_mapping::volume::VolumeKernel;
 pub const TWO_BOUNCES: &str = "bounces=1..2";
 /// Multiples of a footprint's cube root.
 const SPREAD: f32 = 3.0;
-/// Unit of the dampening, m.
+/// Unit of the source's dampening, m.
 const LENGTH: f32 = 1.0;
 
 /// How often photons that are stored were scattered before: the source has a dampening of its own for each of them.
@@ -238,7 +239,7 @@ impl Scenario {
         }
     }
 
-    /// The source's settings for some light paths, with a share of its photons: kernels are wider than its own by the cube root of it.
+    /// The source's settings for some light paths, with a share of its photons, whose kernels are wider than its own by the cube root of it, and the default dampening.
     ///
     /// # Errors
     /// [`Error::Setting`](clerestory::Error::Setting) for paths that are none.
@@ -248,12 +249,22 @@ impl Scenario {
             photons: self.photons / share,
             direct_photons: depths == Depths::UpToOne,
             profile: KernelProfile::Uniform,
-            unit_length: LENGTH,
             volume_kernel: VolumeKernel::Footprint,
             volume_radius: self.greatest,
             volume_spread: SPREAD,
-            volume_dampening: self.dampening(depths),
             ..PhotonSettings::default()
+        })
+    }
+
+    /// Such settings with a dampening in metres, as the source has it.
+    ///
+    /// # Errors
+    /// As [`Self::settings`].
+    pub fn settings_dampened(&self, paths: &str, depths: Depths, share: u32, metres: f32) -> Result<PhotonSettings> {
+        Ok(PhotonSettings {
+            unit_length: LENGTH,
+            volume_dampening: metres,
+            ..self.settings(paths, depths, share)?
         })
     }
 }

@@ -75,6 +75,13 @@ pub struct Found {
     rows: Vec<Row>,
 }
 
+impl Row {
+    /// Whether pictures tell its variances: where few photons bring nearly all of the light, they do not.
+    fn is_known(&self) -> bool {
+        self.collisions.low > 0.0 && self.beams.low > 0.0
+    }
+}
+
 const CRITERIA: &[Criterion<Row>] = &[
     Criterion::each(
         "beams vary less than collisions where kernels are narrow beside the mean free path: ratio",
@@ -88,8 +95,8 @@ const CRITERIA: &[Criterion<Row>] = &[
         Bound::AtLeast(1.0),
         |row: &Row| row.ratio,
     )
-    .among(|row| row.free_paths >= WIDE)
-    .because("dense is a radius of half the mean free path or more"),
+    .among(|row| row.free_paths >= WIDE && row.is_known())
+    .because("dense is a radius of half the mean free path or more; rows whose variances are as uncertain as they are large say nothing"),
     Criterion::each(
         "planes have at most 0.35 of the variance of beams under narrow kernels: ratio",
         Bound::AtMost(0.35),

@@ -1,15 +1,14 @@
 //! How much the kernels of photons in media are to be dampened: the error of one pass by the dampening, in the source's nine scenes and for its three sets of photons.
 //!
 //! Source of the comparison: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §7.3.2 and Table 7.2, whose choices by eye stand beside the
-//! errors. Oracle: the path tracer; where a mirror throws light into a medium, which no path from the eye finds, many passes of photons under kernels of one radius that shrink. The variance of
-//! either is subtracted.
+//! errors. Oracle: the path tracer; where a mirror throws light into a medium, which no path from the eye finds, bidirectional path tracing. The variance of either is subtracted.
 
 use std::sync::Arc;
 
 use clerestory::film::Picture;
 use clerestory::gpu::Gpu;
 use clerestory::render::{RenderOptions, Renderer};
-use clerestory::techniques::photon_mapping::{PhotonMapper, PhotonSettings};
+use clerestory::techniques::photon_mapping::PhotonMapper;
 use clerestory::{Result, scene};
 use serde_json::json;
 
@@ -29,17 +28,13 @@ const FULL: Form = Form {
     size: [32, 24],
     share: 8,
     turns: 5,
-    path_spp: 1024,
-    photons: 1 << 16,
-    passes: 64,
+    spp: 1024,
 };
 const SMOKE: Form = Form {
     size: [8, 6],
     share: 1024,
     turns: 2,
-    path_spp: 16,
-    photons: 1 << 10,
-    passes: 2,
+    spp: 16,
 };
 /// A medium that scatters 98 % of what collides, and one that scatters a quarter.
 const DENSER: [&str; 2] = ["ring, point light", "atrium, neutral"];
@@ -56,26 +51,6 @@ const WEAKER: [(&str, [&str; 2]); 3] = [
     ),
 ];
 
-/// What a kernel of radius r blurs of light about a lamp at a distance d, over r² / d²: of the six constants of single scattering, where r is a tenth of d, 0.22 %.
-const AIRLIGHT_BLUR: f64 = 0.22;
-/// α of the references by photons, the default.
-const REDUCTION: f64 = 2.0 / 3.0;
-
-/// Areas of kernels in each of so many passes, over that in the first.
-fn areas(passes: u32) -> Vec<f64> {
-    let kept = |area: &mut f64, pass: u32| {
-        if pass > 0 {
-            *area *= (f64::from(pass) + REDUCTION) / (f64::from(pass) + 1.0);
-        }
-        Some(*area)
-    };
-    (0..passes).scan(1.0, kept).collect()
-}
-
-fn mean_area(passes: u32) -> f64 {
-    areas(passes).iter().sum::<f64>() / f64::from(passes)
-}
-
 /// Sizes of a run.
 #[derive(Clone, Copy)]
 struct Form {
@@ -84,11 +59,8 @@ struct Form {
     share: u32,
     /// Pictures of each dampening.
     turns: u32,
-    /// Samples a pixel of references by the path tracer.
-    path_spp: u32,
-    /// Photons of a pass, and passes, of references by photons.
-    photons: u32,
-    passes: u32,
+    /// Samples a pixel of references.
+    spp: u32,
 }
 
 rows! {
@@ -193,17 +165,6 @@ impl Study for Found {
                 FULL.turns,
                 TRIED.map(|tried| tried.to_string()).join(", "),
             ))
-            .note(format!(
-                "The three scenes with a ring are judged by photons, not by an independent reference: their reference is photons under fixed kernels that shrink, in {} passes of {}, whose variance is subtracted, but \
-                 not their blur. That goes with the area of kernels, {:.2} of the first pass's on average over the passes and {:.2} in the last: where light falls off as about a lamp at a distance d, by 0.22 r² / d² of it with \
-                 the first radius r, a quarter of a mean free path and a fiftieth of the scene's diagonal at most, so by {:.2} r² / d² of the whole reference: 0.5 % at four radii, and 9 % at one; and what lies within r of a caustic's \
-                 rim is spread across it. Errors that are not well above that say nothing in these scenes. All dampenings have the same reference, whose kernels have none.",
-                FULL.passes,
-                FULL.photons,
-                mean_area(FULL.passes),
-                areas(FULL.passes).last().copied().unwrap_or(1.0),
-                AIRLIGHT_BLUR * mean_area(FULL.passes),
-            ))
             .and(Findings::of(&trends, OF_TREND))
             .and(Findings::of(&self.errors, &[]).long())
     }
@@ -243,10 +204,7 @@ fn rows(context: &Context<'_>, gpu: &Gpu, scenario: &Scenario, depths: Depths) -
         if context.watch.stopped() {
             break;
         }
-        let settings = PhotonSettings {
-            volume_dampening: dampening,
-            ..scenario.settings(depths.path_set(), depths, form.share)?
-        };
+        let settings = scenario.settings_dampened(depths.path_set(), depths, form.share, dampening)?;
         let mut mapper = PhotonMapper::new(gpu, Arc::clone(renderer.gpu_scene()), camera, form.size, settings)?;
         let mut error = Vec::new();
         for seed in 0..form.turns {
@@ -276,17 +234,18 @@ fn reference(
     depths: Depths,
 ) -> Result<Option<Picture>> {
     let form = context.pick(FULL, SMOKE);
-    let (technique, spp, settings) = if scenario.has_mirror {
-        let settings = json!({ "path_set": depths.path_set(), "photons": form.photons });
-        ("photon", form.passes, settings)
+    let mut settings = json!({ "path_set": depths.path_set(), "sampler": "pcg" });
+    let technique = if scenario.has_mirror {
+        // So that the variance of samples that share no vertices is known.
+        settings["samples_at_once"] = json!(1);
+        "bdpt"
     } else {
-        let settings = json!({ "path_set": depths.path_set(), "sampler": "pcg" });
-        ("path", form.path_spp, settings)
+        "path"
     };
     let options = RenderOptions {
         technique: Some(technique.into()),
         size: form.size,
-        spp,
+        spp: form.spp,
         seed: SEED,
         settings: settings.into(),
         ..RenderOptions::default()
@@ -384,15 +343,6 @@ mod tests {
             error: Repeats(error.to_vec()),
             kernels: 0.0,
         }
-    }
-
-    #[test]
-    fn areas_of_references_shrink_as_the_theory_says() {
-        assert!(areas(1) == [1.0] && (areas(2)[1] - 5.0 / 6.0).abs() < 1e-15);
-        // As k to the power of −1/3, over Γ(5/3), whose mean is half as much again.
-        let last = areas(64)[63];
-        assert!((last * 64f64.cbrt() * 0.902_745 - 1.0).abs() < 0.01, "{last}");
-        assert!((mean_area(64) / last - 1.5).abs() < 0.1, "{}", mean_area(64));
     }
 
     #[test]
