@@ -15,11 +15,11 @@ float across_of_planes(float jacobian, float extinction) { return jacobian / (ex
 float even_distance2_across(float across, float phase, float photons) { return photons * across / (16.0 * PI * PI * phase); }
 
 // The same of photons that are seen as collisions and, with `has_beams`, as beams. `sine`: of the angle between both directions at the eye path's first scattering; `extinction`: mean over
-// bands, 1/m; `radius`: of kernels, m.
-float even_distance2(float phase, float sine, float extinction, float radius, float photons, bool has_beams) {
-    float across = PI * radius * radius;
+// bands, 1/m; `collision_radius`, `beam_radius`: of kernels, m.
+float even_distance2(float phase, float sine, float extinction, float collision_radius, float beam_radius, float photons, bool has_beams) {
+    float across = PI * collision_radius * collision_radius;
     if (has_beams) {
-        across += across_of_beams(sine, extinction, radius);
+        across += across_of_beams(sine, extinction, beam_radius);
     }
     return even_distance2_across(across, phase, photons);
 }

@@ -161,7 +161,7 @@ void main() {
         break;
     }
     case 10u: {  // shares of photons and of eye paths
-        float even2 = even_distance2(in1(6u), in1(7u), in1(8u), in1(9u), in1(10u), in_bits(11u) != 0u);
+        float even2 = even_distance2(in1(6u), in1(7u), in1(8u), in1(18u), in1(9u), in1(10u), in_bits(11u) != 0u);
         out1(0u, even2);
         out1(1u, eye_share(in1(12u), even2));
         out1(2u, photon_share(in1(12u), even2));

@@ -1,11 +1,11 @@
 //! Shares of light in media that photons find as well as eye paths that go on: the balance heuristic of both, by what is known at either end of a path.
 //!
 //! Light from x₀ is scattered at x₁ … xₖ, k ≥ 2, the last time in a medium that a ray from the eye goes through. An eye path collides at xₖ and goes on to x₁, where it samples the light; of n
-//! photons one comes to xₖ, and is seen within a radius r of the ray as a collision (density n σ e^(−σs) π r² …) or as a beam (n 2 r sin …). The density of a path by one over that by the other is a
+//! photons one comes to xₖ, and is seen within a radius r of the ray as a collision (density n σ e^(−σs) π r² …) or within one of b as a beam (n 2 b sin …). The density of a path by one over that by the other is a
 //! product over its places, in which densities of scattering between two places are the same from both sides and cancel, with the extinction and the transmittance between them. What is left are the
 //! ends, of which these shares take the phase function and the angle at xₖ and the distance d of the light from x₁:
 //!
-//! eye / photons = d² / e²,  e² = n (π r² + 2 r sin θ / σ) / (16 π² p(xₖ)).
+//! eye / photons = d² / e²,  e² = n (π r² + 2 b sin θ / σ) / (16 π² p(xₖ)).
 //!
 //! They leave out the transmittances from the eye to xₖ, along the last flight of a beam and from the light to x₁, and take light and x₁ for ones that send and scatter evenly. So the shares are near to those of
 //! the balance heuristic, not the least noise there is; but the same function of a path for both, so that they sum to one for every path, and eye paths are not biased by them. A photon that is seen beside the
@@ -43,14 +43,22 @@ pub fn even_distance2_across(across: f64, phase: f64, photons: f64) -> f64 {
 
 /// The same of photons that are seen as collisions and, with `has_beams`, as beams.
 ///
-/// `sine`: of the angle between both directions at the eye path's first scattering; `extinction`: mean over bands, m⁻¹; `radius`: of kernels, m.
-pub fn even_distance2(phase: f64, sine: f64, extinction: f64, radius: f64, photons: f64, has_beams: bool) -> f64 {
+/// `sine`: of the angle between both directions at the eye path's first scattering; `extinction`: mean over bands, m⁻¹; `collision_radius`, `beam_radius`: of kernels, m.
+pub fn even_distance2(
+    phase: f64,
+    sine: f64,
+    extinction: f64,
+    collision_radius: f64,
+    beam_radius: f64,
+    photons: f64,
+    has_beams: bool,
+) -> f64 {
     let of_beams = if has_beams {
-        across_of_beams(sine, extinction, radius)
+        across_of_beams(sine, extinction, beam_radius)
     } else {
         0.0
     };
-    even_distance2_across(PI * radius * radius + of_beams, phase, photons)
+    even_distance2_across(PI * collision_radius * collision_radius + of_beams, phase, photons)
 }
 
 /// Share of eye paths in light whose squared distance from its first scattering is `light2`, m², in \[0, 1\].
@@ -142,7 +150,7 @@ mod tests {
         for round in 0..400 {
             let scatterings = 2 + round % 4;
             let extinction = f64::from(random.magnitude(-4, 3));
-            let radius = f64::from(random.magnitude(-8, -2));
+            let [radius, beam_radius] = [(); 2].map(|()| f64::from(random.magnitude(-8, -2)));
             let photons = f64::from(random.magnitude(0, 20));
             let passed = |a: DVec3, b: DVec3| (-extinction * a.distance(b)).exp();
             // From the light on: its place, those of the scatterings, and the eye's.
@@ -160,22 +168,22 @@ mod tests {
                 * (1..scatterings)
                     .map(|i| flight(places[i + 1], places[i]))
                     .product::<f64>();
-            // A photon leaves the light, collides, and comes within the radius of the ray: as a collision, or on a way that passes.
+            // A photon leaves the light, collides, and comes within a radius of the ray: as a collision, or on a way that passes.
             let before: f64 = photons
                 * (0..scatterings - 1)
                     .map(|i| flight(places[i], places[i + 1]))
                     .product::<f64>();
             let previous = places[scatterings - 1];
             let as_collision = before * flight(previous, last) * PI * radius * radius;
-            let as_beam = before * isotropic / previous.distance_squared(last) * 2.0 * radius * sine;
+            let as_beam = before * isotropic / previous.distance_squared(last) * 2.0 * beam_radius * sine;
             for has_beams in [false, true] {
                 let by_photons = as_collision + if has_beams { as_beam } else { 0.0 };
-                let even2 = even_distance2(isotropic, sine, extinction, radius, photons, has_beams);
+                let even2 = even_distance2(isotropic, sine, extinction, radius, beam_radius, photons, has_beams);
                 let light2 = places[0].distance_squared(first);
                 let across = |attenuated: f64| {
                     PI * radius * radius
                         + if has_beams {
-                            2.0 * radius * sine / (extinction * attenuated)
+                            2.0 * beam_radius * sine / (extinction * attenuated)
                         } else {
                             0.0
                         }
@@ -263,7 +271,8 @@ mod tests {
 
     #[test]
     fn lengths_do_not_show_and_narrow_kernels_leave_all_to_eye_paths() {
-        let even = |scale: f64, radius: f64| even_distance2(0.2, 0.5, 3.0 / scale, radius * scale, 1e4, true);
+        let even =
+            |scale: f64, radius: f64| even_distance2(0.2, 0.5, 3.0 / scale, radius * scale, radius * scale, 1e4, true);
         for scale in [1e-3, 1e3] {
             assert!((even(scale, 0.02) / (scale * scale * even(1.0, 0.02)) - 1.0).abs() < 1e-12);
         }

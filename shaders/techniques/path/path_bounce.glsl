@@ -23,8 +23,8 @@ layout(push_constant, scalar) uniform Push {
     uint surrounding;       // index of the medium outside all bodies, or NO_MEDIUM
     uint accepting;         // states of the automaton in which light counts, a bit each
     uint successors[15];    // of each state
-    float edge_bound;       // of EDGE_BOUND, beyond which paths have the light of an edge; of SHARES_PLANES, beside which no edge is bounded, the share of ways that have planes
-    float photon_radius;    // of SHARES, within which photons are seen
+    float edge_bound;       // of EDGE_BOUND, beyond which paths have the light of an edge. Beside SHARES no edge is bounded: of SHARES_PLANES the share of ways that have planes, else the radius of collisions
+    float beam_radius;      // of SHARES, within which beams are seen
 } push;
 
 #include "techniques/path/path_roulette.glsl"

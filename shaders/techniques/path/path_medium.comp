@@ -65,13 +65,14 @@ void note_scattering(WalkState path, SceneMedium m, vec3 wi, float phase) {
     if (path_even_distance2 != 0.0) {
         path_even_distance2 = even_distance2_here(path, m, wi);
     } else if (SHARES_PLANES) {
-        float across = across_of_beams(length(crossing), mean_extinction(m.sigma_t), push.photon_radius);
+        float across = across_of_beams(length(crossing), mean_extinction(m.sigma_t), push.beam_radius);
         path_even_distance2 = -max(even_distance2_across(across, phase, float(SHARING_PHOTONS)), NORMAL_MIN);
         path_flight.crossing = crossing;
     } else {
         bool has_beams = !(HAS_GRIDS && m.has_grid != 0u);
+        float extinction = mean_extinction(m.sigma_t);
         path_even_distance2 =
-            -even_distance2(phase, length(crossing), mean_extinction(m.sigma_t), push.photon_radius, float(SHARING_PHOTONS), has_beams);
+            -even_distance2(phase, length(crossing), extinction, push.edge_bound, push.beam_radius, float(SHARING_PHOTONS), has_beams);
     }
     path_flight.evenness = 4.0 * PI * phase;
 }

@@ -91,7 +91,7 @@ bool counts_here(uint medium, uint history) {
 
 // A short beam reaches a place with the same probability as the photon's own flight, so both densities have the same transmittance and it cancels: the flight counts as 0.
 float share_of_points(float flight, float sine) {
-    return point_share(mean_extinction(beam.m.sigma_t), SHORT_WAYS ? 0.0 : flight, push.radius, push.radius, sine);
+    return point_share(mean_extinction(beam.m.sigma_t), SHORT_WAYS ? 0.0 : flight, push.collision_radius, push.beam_radius, sine);
 }
 
 // What takes from light along a beam.
@@ -101,10 +101,11 @@ vec3 way_extinction() { return SHORT_WAYS ? short_way_extinction(beam.m.sigma_s,
 float share_left_by_eye_paths(uvec4 q2, float phase, float sine, bool has_beams) {
     float extinction = mean_extinction(beam.m.sigma_t);
     if (PLANES) {
-        float across = across_of_beams(sine, extinction, push.radius);
+        float across = across_of_beams(sine, extinction, push.beam_radius);
         return photon_share(beside_planes_light2(q2), even_distance2_across(across, phase, push.photons));
     }
-    return photon_share(unpack_light_distance2(q2), even_distance2(phase, sine, extinction, push.radius, push.photons, has_beams));
+    float even2 = even_distance2(phase, sine, extinction, push.collision_radius, push.beam_radius, push.photons, has_beams);
+    return photon_share(unpack_light_distance2(q2), even2);
 }
 
 // Adds a beam's light where the ray passes it.
@@ -115,10 +116,10 @@ void add_beam(uvec4 q0, uvec4 q1, uvec4 q2) {
     if (reach > 0.0 && counts_here(b.medium, b.bounce)) {
         way /= reach;
         BeamMeeting at = meet_beam(beam.origin, beam.direction, b.start, way);
-        float relative = at.squared / (push.radius * push.radius);
+        float relative = at.squared / (push.beam_radius * push.beam_radius);
         if (at.sine > 0.0 && relative < 1.0 && at.along >= 0.0 && at.along < reach && at.t > beam.from && at.t < beam.to) {
             vec3 passed = passed_to(at.t) * transmittance(way_extinction(), at.along);
-            float weight = line_profile(PROFILE, relative) / (push.radius * at.sine);
+            float weight = line_profile(PROFILE, relative) / (push.beam_radius * at.sine);
             float phase = phase_function(beam.m.phase, beam.m.phase_parameter, way, -beam.direction);
             weight *= phase;
             if (CARRIES_LIGHT_DISTANCE) {

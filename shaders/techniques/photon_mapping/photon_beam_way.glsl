@@ -66,7 +66,8 @@ layout(push_constant, scalar) uniform Push {
     uint least_bounces;  // scatterings in all, with that of the event
     uint most_bounces;
     float scale;         // of stored fluxes
-    float radius;        // of beams, and of collisions beside them
+    float beam_radius;
+    float collision_radius;  // beside beams
     float plane_weight;  // of planes' fluxes, beside the scale
     float photons;       // of a pass, of CARRIES_LIGHT_DISTANCE
     uint first_place;    // of LINEAR

@@ -116,8 +116,8 @@ bool is_point(uvec4 q2) { return q2.w == POINT_RECORD; }
 
 // Share that the estimate by collisions has of light that one by beams has, too, in media of this mean extinction: the balance heuristic. A photon collides within the disk of a
 // ray with the density of its flight times the disk's area; its beam passes within a width of both sides, seen at an angle of this sine.
-float point_share(float extinction, float flight, float point_radius, float beam_radius, float sine) {
-    float points = extinction * exp(-extinction * flight) * PI * point_radius * point_radius;
+float point_share(float extinction, float flight, float collision_radius, float beam_radius, float sine) {
+    float points = extinction * exp(-extinction * flight) * PI * collision_radius * collision_radius;
     float both = points + 2.0 * beam_radius * sine;
     return both > 0.0 ? points / both : 1.0;
 }

@@ -10,7 +10,7 @@
 
 struct EventKernelSettings {
     float spread;       // times the cube root of the volume, step cbrt(4 pi / n) included
-    float dampening;    // cube root in unit lengths from which on kernels grow slower; 0 for none
+    float dampening;    // cube root, over that of the square of the unit length times the least mean free path, from which on kernels grow slower; 0 for none
     float unit_length;  // m
     float length_min;   // of radii, m
     float length_max;

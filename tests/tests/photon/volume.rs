@@ -619,7 +619,7 @@ fn kernels_shrink_as_the_theory_says() {
         for (volume, exponent) in [
             (VolumeEstimate::Beams, 1.0),
             (VolumeEstimate::Ray, 2.0),
-            // As of collisions, which stand alone in grids.
+            // Of collisions, which stand alone in grids; beams beside them shrink as beams do.
             (VolumeEstimate::Unified, 2.0),
             (VolumeEstimate::March, 3.0),
         ] {
@@ -637,7 +637,12 @@ fn kernels_shrink_as_the_theory_says() {
                     (ratio / expected - 1.0).abs() < 1e-6,
                     "{volume:?} {pass}: {ratio} {expected}"
                 );
+                if volume != VolumeEstimate::Ray && volume != VolumeEstimate::March {
+                    let ratio = mapper.beam_radius(pass) / mapper.beam_radius(pass - 1);
+                    assert!((ratio / expected - 1.0).abs() < 1e-6, "{volume:?} {pass}: {ratio}");
+                }
             }
+            assert_eq!(mapper.beam_radius(0), 0.5);
         }
         // Without a radius of its own a fiftieth of the diagonal, where rays meet few events.
         let settings = PhotonSettings {

@@ -682,6 +682,7 @@ fn shares_with_eye_paths_agree_with_their_twins() {
                     r.range(0.0, 5.0),
                     code(r.below(2)),
                     r.choose(&[0.0, 3.0, -0.25, -f32::MIN_POSITIVE]),
+                    r.magnitude(-8, 2),
                 ],
             )
         });
@@ -689,7 +690,7 @@ fn shares_with_eye_paths_agree_with_their_twins() {
         for (case, result) in table.iter().zip(&results) {
             let x = case.0.map(f64::from);
             let is = |i: usize| case.0[i].to_bits() != 0;
-            let even2 = even_distance2(x[6], x[7], x[8], x[9], x[10], is(11));
+            let even2 = even_distance2(x[6], x[7], x[8], x[18], x[9], x[10], is(11));
             let placeless2 = placeless_distance2(v3(&x, 0), v3(&x, 3));
             let carried2 = carried_distance2(x[13], case.0[14].to_bits(), x[15], is(16));
             let twins = [

@@ -36,7 +36,7 @@ use self::record::{EyeStages, ResolveTarget, UnderWay, record_resolve};
 use self::refill::{FullWave, ResultMemory, slot_numbers};
 pub use self::settings::{Adaptive, LightTreeUse, PathTracerSettings};
 use self::shared_light::SharedLight;
-pub(crate) use self::shared_light::SharingPhotons;
+pub(crate) use self::shared_light::{PhotonRadii, SharingPhotons};
 pub(crate) use self::wave::SAMPLES_PER_WAVE;
 use self::wave::{Cursor, Wave, slots_of_picture};
 use crate::catalogue::{Bias, Role, Row, sources};
@@ -469,10 +469,10 @@ impl PathTracer {
         self.kept.departures().clone()
     }
 
-    /// Within which photons are seen that share light with the paths, m, and which share of their ways has planes, if any has: for waves that have not begun.
-    pub(crate) fn see_photons(&mut self, radius: f64, plane_share: f64) {
+    /// Radii within which photons are seen that share light with the paths, and which share of their ways has planes, if any has: for waves that have not begun.
+    pub(crate) fn see_photons(&mut self, radii: PhotonRadii, plane_share: f64) {
         let light = &mut self.shared_light;
-        light.photon_radius = radius as f32;
+        light.radii = radii;
         light.plane_share = light.plane_share.map(|_| plane_share as f32);
     }
 

@@ -91,8 +91,8 @@ impl EyeStages<'_> {
             surrounding: scene.surrounding().unwrap_or(NO_MEDIUM),
             accepting: settings.path_set.accepting(),
             successors: settings.path_set.successors(),
-            edge_bound: self.shared_light.bound_or_plane_share(),
-            photon_radius: self.shared_light.photon_radius,
+            edge_bound: self.shared_light.bound_or_photons(),
+            beam_radius: self.shared_light.radii.beams as f32,
         }
     }
 }

@@ -9,17 +9,30 @@ pub(super) struct SharedLight {
     pub edge_bound: EdgeBound,
     /// Photons of a pass that share what paths scatter behind their first scattering in a medium (`transport/photon_share.glsl`); 0: none does.
     pub photons: u32,
-    /// Radius within which these photons are seen, m.
-    pub photon_radius: f32,
+    /// Radii within which these photons are seen, m.
+    pub radii: PhotonRadii,
     /// Where these have planes: the share of their ways that do. No edge is bounded besides.
     pub plane_share: Option<f32>,
 }
 
 impl SharedLight {
-    /// What paths are told of either, since there is never both.
-    pub fn bound_or_plane_share(&self) -> f32 {
-        self.plane_share.unwrap_or_else(|| self.edge_bound.value())
+    /// What paths are told in one place, since there is never more than one of them: the bound, or of photons the share of planes, or the radius of collisions.
+    pub fn bound_or_photons(&self) -> f32 {
+        match (self.photons, self.plane_share) {
+            (_, Some(share)) => share,
+            (0, None) => self.edge_bound.value(),
+            (_, None) => self.radii.collisions as f32,
+        }
     }
+}
+
+/// Radii of the kernels of photons in media, m.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct PhotonRadii {
+    /// Of beams; of collisions where there are no beams.
+    pub beams: f64,
+    /// Of collisions, which may stand beside beams.
+    pub collisions: f64,
 }
 
 /// Photons of a pass that share light with paths.

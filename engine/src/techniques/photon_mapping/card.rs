@@ -96,7 +96,7 @@ fn scatters_evenly(profile: &SceneProfile) -> bool {
 
 /// With reduction α, kernels' area falls as passes^(α − 1). What they blur is off by as much, and the variance falls as passes^(−α). The width of beams and the
 /// volume of balls fall so, too, and blur goes with the square of lengths, so that what is off falls as passes^(2(α − 1)) by beams, and by balls as
-/// passes^(2(α − 1)/3). Settings that ask for beams or balls are taken for those of pictures of media.
+/// passes^(2(α − 1)/3); by collisions beside beams the slower one decides. Settings that ask for beams or balls are taken for those of pictures of media.
 ///
 /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011, §4.
 fn law(settings: &Settings) -> Result<Law> {

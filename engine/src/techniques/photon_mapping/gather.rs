@@ -21,6 +21,7 @@ use crate::gpu::shaders::constants::{
 };
 use crate::gpu::shaders::techniques::photon_mapping::{photon_gather, photon_gather_packet};
 use crate::gpu::{Buffer, BufferDesc, Category, ComputePipeline, Gpu, PipelineInfo, SOFTWARE_LOOP_CAP, wide_counter};
+use crate::techniques::path::PhotonRadii;
 use crate::transport::{GpuScene, PathSet, surface_spec};
 use crate::{Error, Result};
 
@@ -72,8 +73,8 @@ pub(super) struct Gather {
 /// A map of media, as its queries need it.
 pub(super) struct EventsAsked<'a> {
     pub map: &'a EventMap,
-    /// Of beams, m.
-    pub radius: f64,
+    /// Of their kernels.
+    pub radii: PhotonRadii,
     /// Share of ways that have planes.
     pub plane_share: f64,
 }
@@ -218,7 +219,7 @@ impl Gather {
             beam,
             map: events.map,
             scale: scale as f32,
-            radius: events.radius as f32,
+            radii: events.radii,
             plane_share: events.plane_share as f32,
         });
         GatherStage {

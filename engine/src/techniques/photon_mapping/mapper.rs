@@ -33,7 +33,7 @@ use crate::film::{PixelFormat, Step};
 use crate::gpu::{Buffer, Gpu, PipelineInfo};
 use crate::scene::{Camera, SceneProfile};
 use crate::settings::TypedSettings;
-use crate::techniques::path::{PathCounters, SharingPhotons};
+use crate::techniques::path::{PathCounters, PhotonRadii, SharingPhotons};
 use crate::techniques::{PathTracer, PathTracerSettings};
 use crate::transport::GpuScene;
 use crate::walk::ArrivalStage;
@@ -326,7 +326,7 @@ impl PhotonMapper {
         let mut timings = Vec::new();
         let (kernel, watts, event_kernel) = (self.kernel(pass), self.watts(), self.event_kernel(pass));
         let (path_share, shrunk) = (self.event_path_share(pass), self.settings.event_shrinkage(pass));
-        let plane_share = self.plane_share();
+        let (radii, plane_share) = (self.event_radii(pass), self.plane_share());
         if let Some(photons) = &mut self.photons
             && photons.maps.is_none()
         {
@@ -372,7 +372,7 @@ impl PhotonMapper {
             }
             if let (Some(maker), Some(events)) = (&mut photons.event_maps, photons.tracer.events()) {
                 let clock = Instant::now();
-                let (map, building) = maker.make(events, traced.events, &event_kernel, shrunk)?;
+                let (map, building) = maker.make(events, traced.events, &event_kernel, radii.beams, shrunk)?;
                 seconds += clock.elapsed().as_secs_f64();
                 if let Some(building) = building {
                     let built = building.wait()?;
@@ -401,7 +401,7 @@ impl PhotonMapper {
                     maps.surfaces.as_ref(),
                     maps.events.as_ref().map(|map| EventsAsked {
                         map,
-                        radius: event_kernel.length_max,
+                        radii,
                         plane_share,
                     }),
                     watts,
@@ -411,7 +411,7 @@ impl PhotonMapper {
             _ => None,
         };
         let arrival = stage.as_ref().map(|stage| stage as &dyn ArrivalStage);
-        self.eye.see_photons(event_kernel.length_max, plane_share);
+        self.eye.see_photons(radii, plane_share);
         let step = self.eye.step_with(end, arrival)?;
         if let Some(photons) = &mut self.photons {
             // They are those of a whole wave.
@@ -517,9 +517,18 @@ impl PhotonMapper {
         self.settings.kernel(pass, self.diagonal(), self.scene.surface_area())
     }
 
-    /// Radius of the kernels of events in media, m, in a pass; the greatest where media differ, or where they follow footprints or neighbours.
+    /// Radius of the kernels of events in media, m, in a pass; the greatest where media differ, or where they follow footprints or neighbours. Of collisions, where these stand beside beams.
     pub fn event_radius(&self, pass: u32) -> f64 {
         self.settings.event_radius(pass, &self.media_lengths())
+    }
+
+    /// Radius of the kernels of photon beams, m, in a pass; that of collisions where there are no beams.
+    pub fn beam_radius(&self, pass: u32) -> f64 {
+        self.event_radii(pass).beams
+    }
+
+    fn event_radii(&self, pass: u32) -> PhotonRadii {
+        self.settings.event_radii(pass, &self.media_lengths())
     }
 
     /// How the kernels of events in media are made in a pass.

@@ -6,10 +6,10 @@ use super::tracer::{PhotonPlan, Stored};
 use super::volume::footprint::{EventKernelSettings, event_step};
 use super::volume::transmittance::VolumeTransmittance;
 use super::volume::ways::BeamLength;
-use super::volume::{VolumeEstimate, VolumeKernel};
+use super::volume::{BEAM_DIMENSIONS, VolumeEstimate, VolumeKernel};
 use crate::gpu::shaders::constants::PHOTON_BOUNCE_MAX;
 use crate::settings::{Above, AboveTo, OrZero};
-use crate::techniques::path::SAMPLES_PER_WAVE;
+use crate::techniques::path::{PhotonRadii, SAMPLES_PER_WAVE};
 use crate::transport::PathSet;
 use crate::transport::differentials::global_step;
 use crate::transport::path_set::PATH_SET_LOBES;
@@ -144,7 +144,7 @@ crate::settings! {
         pub samples_per_pass: u32 = 1, in 1..=SAMPLES_PER_WAVE, unit "samples";
         /// How photons in media are seen: collisions under disks across each eye ray, one query for all of it, or under balls at places along it; or, in homogeneous
         /// media alone, whole ways, or planes that two flights span, without blur, beside the ways of light that was not scattered twice in a row there; or collisions and ways together, each
-        /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin; in grids there are collisions alone.
+        /// weighted by what the other has of the same light, which is good where a medium is dense as well as where it is thin; each has kernels of its own, of one radius in the first pass, and in grids there are collisions alone.
         pub volume: VolumeEstimate = VolumeEstimate::Ray;
         /// How far photon beams reach: to the next surface (`long`), weighted by the transmittance along them, or each to a random end (`short`), drawn from the least extinct
         /// band that scatters.
@@ -169,9 +169,9 @@ crate::settings! {
         pub volume_radius: f32 = 0.0, in 0.0.., unit "m";
         /// Size of kernels in media that follow footprints, in the first pass: multiples of the cube root of a footprint's volume.
         pub volume_spread: f32 = 3.0, in Above(0.0), unit "footprints";
-        /// From which size on kernels in media that follow footprints grow slower, by a logarithm, in unit lengths; 0 leaves them as they are.
+        /// From which size on kernels in media that follow footprints grow slower, by a logarithm: the cube root of a footprint's volume, as for one photon in all, over that of the square of the unit length times the medium's least mean free path; 0 leaves them as they are.
         ///
-        /// By the default, two ninths of the scene's diagonal, rays meet about as many kernels as by 85 neighbours; sizes in metres do not carry over from scene to scene.
+        /// By the default rays meet about as many kernels as by 85 neighbours; sizes in metres do not carry over from scene to scene.
         pub volume_dampening: f32 = 2.0, in 0.0..;
         /// Eye paths go on behind their first scattering in a medium, and share the light that they find there with photons, each weighted by what the others have of it; for
         /// `unified` and `planes` alone, and not with final_gather.
@@ -309,9 +309,24 @@ impl PhotonSettings {
     ///
     /// Source: C. Knaus and M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach", ACM TOG 30(3), 2011.
     pub(super) fn event_radius(&self, pass: u32, lengths: &MediaLengths) -> f64 {
+        self.first_event_radius(lengths) * self.event_shrinkage(pass)
+    }
+
+    /// The same of beams and of collisions, which shrink at rates of their own where they stand beside each other.
+    pub(super) fn event_radii(&self, pass: u32, lengths: &MediaLengths) -> PhotonRadii {
+        let collisions = self.event_radius(pass, lengths);
+        let beams = if self.stores_ways() {
+            self.first_event_radius(lengths) * self.shrinkage_of(pass, BEAM_DIMENSIONS)
+        } else {
+            collisions
+        };
+        PhotonRadii { beams, collisions }
+    }
+
+    fn first_event_radius(&self, lengths: &MediaLengths) -> f64 {
         // Beams have one radius in all media, events each medium's own.
         let free_path = lengths.free_path(self.stores_ways());
-        let first = match (f64::from(self.volume_radius), self.volume_kernel) {
+        match (f64::from(self.volume_radius), self.volume_kernel) {
             (0.0, VolumeKernel::Fixed) => {
                 let by_path = PATH_SHARE * free_path;
                 let by_scene = RADIUS_SHARE * lengths.diagonal;
@@ -319,8 +334,7 @@ impl PhotonSettings {
             }
             (0.0, VolumeKernel::Footprint | VolumeKernel::Neighbor) => self.event_unit_length(lengths),
             (set, _) => set,
-        };
-        first * self.event_shrinkage(pass)
+        }
     }
 
     /// Radius of the kernels of events over the mean free path of their medium where it is densest, at most, in a pass; 0 for any.
@@ -350,13 +364,17 @@ impl PhotonSettings {
 
     /// Power of the width of kernels in media with which the number that a ray meets goes, where they lie evenly: disks and balls by their area, beams by their width.
     pub(super) fn event_dimensions(&self) -> f64 {
-        if self.stores_ways() { 1.0 } else { 2.0 }
+        if self.stores_ways() { BEAM_DIMENSIONS } else { 2.0 }
     }
 
     /// Radius of events' kernels in a pass relative to the first.
     pub(super) fn event_shrinkage(&self, pass: u32) -> f64 {
-        let shrunk = shrinkage(pass, f64::from(self.reduction));
-        shrunk.powf(2.0 / self.volume.dimensions())
+        self.shrinkage_of(pass, self.volume.dimensions())
+    }
+
+    /// The same of kernels of so many dimensions.
+    fn shrinkage_of(&self, pass: u32, dimensions: f64) -> f64 {
+        shrinkage(pass, f64::from(self.reduction)).powf(2.0 / dimensions)
     }
 
     /// Whether the ways of photons through media are stored, instead of their collisions or beside them.

@@ -24,6 +24,7 @@ use crate::gpu::shaders::types::{AskSettings, BeamWay};
 use crate::gpu::{
     Buffer, BufferDesc, BufferView, Category, ComputePipeline, Gpu, Pass, PipelineInfo, Recorder, wide_counter,
 };
+use crate::techniques::path::PhotonRadii;
 use crate::techniques::photon_mapping::gather::{GatherCounts, RayFetches};
 use crate::techniques::photon_mapping::path_classes::{ASKING_STATES, PathClasses};
 use crate::techniques::photon_mapping::queue::{AskSpec, Queue, QueueMemory};
@@ -118,8 +119,8 @@ pub(in crate::techniques::photon_mapping) struct BeamStage<'a> {
     pub map: &'a EventMap,
     /// Of stored fluxes, in W a photon.
     pub scale: f32,
-    /// Of beams, m.
-    pub radius: f32,
+    /// Of kernels.
+    pub radii: PhotonRadii,
     /// Share of ways that have planes.
     pub plane_share: f32,
 }
@@ -350,7 +351,8 @@ impl BeamStage<'_> {
             least_bounces: self.beam.bounces[0],
             most_bounces: self.beam.bounces[1],
             scale: self.scale,
-            radius: self.radius,
+            beam_radius: self.radii.beams as f32,
+            collision_radius: self.radii.collisions as f32,
             plane_weight: 1.0 / self.plane_share,
             photons: self.beam.photons as f32,
             classes: self.beam.classes,

@@ -111,8 +111,8 @@ pub fn unpack_beam(words: &EventWords) -> PhotonBeam {
 ///
 /// A photon collides within the disk of a ray with the density of its flight, of this length, times the disk's area; its beam passes within a width of both sides, seen at an angle of this
 /// sine. Radii and lengths in metres.
-pub fn point_share(extinction: f64, flight: f64, point_radius: f64, beam_radius: f64, sine: f64) -> f64 {
-    let points = extinction * (-extinction * flight).exp() * PI * point_radius * point_radius;
+pub fn point_share(extinction: f64, flight: f64, collision_radius: f64, beam_radius: f64, sine: f64) -> f64 {
+    let points = extinction * (-extinction * flight).exp() * PI * collision_radius * collision_radius;
     let both = points + 2.0 * beam_radius * sine;
     if both > 0.0 { points / both } else { 1.0 }
 }

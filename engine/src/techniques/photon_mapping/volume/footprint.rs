@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 pub struct EventKernelSettings {
     /// Times the cube root of the volume, [`event_step`] included.
     pub spread: f64,
-    /// Cube root in unit lengths from which on kernels grow slower; 0 for none.
+    /// Cube root, over that of the square of the unit length times the least mean free path, from which on kernels grow slower; 0 for none.
     pub dampening: f64,
     /// The unit of lengths, m; it scales with the scene.
     pub unit_length: f64,

@@ -1,6 +1,6 @@
 //! The volume map: a compact hierarchy over the kernels of a pass's events, and the events in the order of its leaves; built by device or host.
 //!
-//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2, §6.2 and §7.4.2, whose leaves hold sixteen events.
+//! Source: B. Fabianowski, "Interactive Manycore Photon Mapping", PhD thesis, Trinity College Dublin, 2011, §6.1.2, §6.2 and §7.4.2, whose leaves hold sixteen events instead of four.
 //!
 //! Guarantees: a ray's query visits every kernel that it pierces; the same bytes on any number of threads, by host and device.
 
@@ -28,8 +28,8 @@ use crate::{Error, Result};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Events of a leaf, at most, where their codes tell them apart.
-const LEAF_SIZE: u32 = 16;
+/// Events of a leaf, at most, where their codes tell them apart. Of larger leaves rays test more kernels that they pass by.
+const LEAF_SIZE: u32 = 4;
 
 /// A map on the device.
 #[derive(Debug)]
@@ -106,7 +106,7 @@ impl EventMaps {
     }
 
     /// A map of the first `count` of `events`, and the submission that builds it, if the device does. Kernels that the trace has not made are made so: those of
-    /// beams, and those by neighbours, of which the share `shrunk` is left.
+    /// beams, of a radius, m, and those by neighbours, of which the share `shrunk` is left.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] for more events than the device can build over where it is to, [`Error::OutOfMemory`], [`Error::DeviceLost`].
@@ -115,9 +115,10 @@ impl EventMaps {
         events: &TexelView,
         count: u32,
         kernel: &EventKernelSettings,
+        beam_radius: f64,
         shrunk: f64,
     ) -> Result<(EventMap, Option<Submission>)> {
-        let radius = kernel.length_max as f32;
+        let radius = beam_radius as f32;
         if let Some(device) = self.device.as_mut().filter(|_| count > 0) {
             match device.build(&self.gpu, events, count, radius) {
                 Err(Error::LimitExceeded { .. } | Error::OutOfMemory { .. }) if self.or_host => {}

@@ -59,13 +59,16 @@ pub enum VolumeEstimate {
     March,
 }
 
+/// Dimensions of the kernels of beams: their width.
+pub(super) const BEAM_DIMENSIONS: f64 = 1.0;
+
 impl VolumeEstimate {
     /// Of its kernels.
     pub(super) fn dimensions(self) -> f64 {
         match self {
             // What planes leave is seen by beams.
-            Self::Beams | Self::Planes => 1.0,
-            // In grids collisions stand alone.
+            Self::Beams | Self::Planes => BEAM_DIMENSIONS,
+            // Of its collisions, which shrink slowest; beams beside them shrink as beams do.
             Self::Ray | Self::Unified => 2.0,
             Self::March => 3.0,
         }
@@ -231,7 +234,7 @@ pub(crate) const ROWS: &[Row] = &[
         id: "CL-PHOTON-UNIFIED",
         name: "photon collisions and beams together, and eye paths that go on, weighted by the balance heuristic",
         role: Role::PartOf("PM-SYS-1"),
-        limits: "Photons are seen where eye paths first scatter in a medium, under one radius for both, in grids collisions alone; eye paths go on only where `volume_paths` asks for them, and have none of what a mirror scatters first; their weights take the ends of a path alone, without transmittances and as if lights and first scatterings were even; planes are not weighted against the others; records take 48 bytes, of which 128 MiB hold 2.8 million.",
+        limits: "Photons are seen where eye paths first scatter in a medium, under one radius for both in the first pass, which shrinks as beams' and as collisions' do, in grids collisions alone; eye paths go on only where `volume_paths` asks for them, and have none of what a mirror scatters first; their weights take the ends of a path alone, without transmittances and as if lights and first scatterings were even; planes are not weighted against the others; records take 48 bytes, of which 128 MiB hold 2.8 million.",
         sources: &[
             sources::GPUUPBP.at("the published order of collisions and beams on a GPU"),
             sources::KRIVANEK_2014.whole(),

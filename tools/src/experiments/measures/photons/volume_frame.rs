@@ -209,7 +209,7 @@ impl Study for Found {
             )
             .note(format!(
                 "{} × {} pixels, one sample each; {} frames, the lamp 3 cm further along each axis in each, so that intervals hold what its place changes too. Light of one and two bounces, \
-                 with the source's photons, kernels and dampening. Unlike the source's, our photons land on surfaces as well, which are asked for them: the share leaves the time of these \
+                 with the source's photons and greatest radii, under the default dampening. Unlike the source's, our photons land on surfaces as well, which are asked for them: the share leaves the time of these \
                  queries out, maps are both, and direct light is the photons'. Times of passes are GPU times, a frame is wall clock.",
                 FULL.0[0], FULL.0[1], FULL.1,
             ))
